@@ -15,7 +15,7 @@ from mumacro.inputs.kind import AMPLITUDE, Kind
 from mumacro.results import Result, Rows, cell
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
-#: float for one case; for many an array of float64, or a labelled object in its place
+#: float for one case; for many an array of float64
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
 
@@ -159,16 +159,10 @@ class Answer(Result, Generic[Number]):
         """l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact; as v_tilde."""
         return self._group(2)
 
-    def _by_source(self, name: str, table: Any) -> Any:
-        """``table`` (sources + 1,) looked up at the source code; its last entry is that of -1.
-        ``name`` is that of the result, for labelled answers."""
-        del name
-        return table[self.source_code]
-
     @property
     def regime_code(self) -> Any:
         """Index into :data:`mumacro.REGIMES`: int, or ndarray of int8; -1 for an illegal case."""
-        codes = self._by_source("regime_code", _REGIME_CODES)
+        codes: Any = _REGIME_CODES[self.source_code]
         return int(codes) if isinstance(self.source_code, int) else codes
 
     @property
@@ -179,13 +173,13 @@ class Answer(Result, Generic[Number]):
         springs of a ball slide continuously and others do not; ``"reverse_slip"`` where an
         oscillation along slides backwards, too.
         """
-        return self._by_source("regime", _REGIME_NAMES)
+        return _REGIME_NAMES[self.source_code]
 
     @property
     def source(self) -> Any:
         """Name of the block or closed form that gave the value: str, or ndarray of shared str, made
         on request."""
-        return self._by_source("source", _SOURCE_NAMES)
+        return _SOURCE_NAMES[self.source_code]
 
     @property
     def regime_certain(self) -> Any:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mumacro import plotting
 from mumacro.answer import Answer
 from mumacro.errors import InputError, TableError
-from mumacro.frames import evaluate_labelled
+from mumacro.frames import evaluate_labelled, frame_of_cases
 from mumacro.inputs.cases import (
     ABSENT,
     COLUMNS,
@@ -24,6 +24,7 @@ from mumacro.inputs.cases import (
     named,
     no_such_input,
 )
+from mumacro.inputs.columns import is_column, read_column
 from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
 from mumacro.inputs.kind import BALL, SPRING, Kind, kind_of
 from mumacro.inputs.reading import NUMBERS, read
@@ -48,6 +49,8 @@ _FLOAT = np.dtype(np.float64)
 #: effects of an illegal value in an array
 ILLEGAL = ("nan", "raise")
 _WORDS = (Absent, str)
+_SIMPLE = NUMBERS | {np.ndarray, str}
+_SIX_WITH_F = tuple("f" if name == "omega" else name for name in FIELDS)
 _OPTIONS: dict[str, Any] = {"include": (), "gradient": False, "illegal": "nan"}
 _SHORT: dict[Any, Kind] = {ABSENT: SPRING, "spring": SPRING, "ball": BALL}
 _SLOPES = tuple(f"{name}.{field}" for name in ("gradient", "gradient_bound") for field in FIELDS)
@@ -558,17 +561,23 @@ class Surrogate:
             and type(contact) in _WORDS
             and contact in _SHORT
             and (f is ABSENT or omega is ABSENT)
-            and not (include or unknown_names)
+            and not unknown_names
             and illegal == "nan"
         ):
             # One case across in plain numbers takes this short way, in a third of the time.  What
             # it cannot answer goes the long way, which has the messages.
             six = (mu0, Fz, k, y0, omega if f is ABSENT else f, v0)
-            if {*map(type, six)} <= NUMBERS and not (gradient and k == math.inf):
+            types = {*map(type, six)}
+            if types <= NUMBERS and not include and not (gradient and k == math.inf):
                 with suppress(OverflowError):  # a whole number beyond double range
                     answer = self._one(six, f is not ABSENT, gradient, _SHORT[contact])
                     if answer.source_code >= 0:
                         return answer
+            if types <= _SIMPLE:  # there is nothing else to look for
+                fields = FIELDS if f is ABSENT else _SIX_WITH_F
+                of_six = Cases.of(dict(zip(fields, six, strict=True)), _SHORT[contact])
+                wanted = [*names_in(include), "gradient"] if gradient else names_in(include)
+                return self.answer(of_six, chosen(wanted, of_six))
         for name, value in unknown_names.items():
             raise no_such_input(name, value)
         arguments = locals()
@@ -584,7 +593,7 @@ class Surrogate:
         names = names_in(options["include"])
         if options["gradient"]:
             names.append("gradient")
-        if has_labels(values.values()):
+        if has_labels(values.values()) or (cases is not None and frame_of_cases(cases)):
             return evaluate_labelled(self, cases, values, names, strict)
         cases = Cases.of(values, strict=strict)
         return self.answer(cases, chosen(names, cases))
@@ -669,7 +678,8 @@ def _flat_groups(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, .
         v, y = v_tilde, y_tilde
     else:
         v, y = (
-            np.asarray(read(name, x).si) for name, x in (("v_tilde", v_tilde), ("y_tilde", y_tilde))
+            read_column(name, x).si if is_column(x) else np.asarray(read(name, x).si)
+            for name, x in (("v_tilde", v_tilde), ("y_tilde", y_tilde))
         )
     try:
         shape = common_shape((v, y))

@@ -348,11 +348,9 @@ def test_rigid_is_given_as_the_word_or_infinity_in_numbers_and_in_arrays(table: 
     assert worded.source.tolist() == ["rigid", elastic.source, ""]
 
 
-@pytest.mark.parametrize(
-    "gap", [None, math.nan, "", "much", ["rigid", None], ["rigid", ""], [1e6, "much"]]
-)
+@pytest.mark.parametrize("gap", [None, math.nan, "", "much"])
 def test_a_gap_is_no_rigid_contact_and_the_remedy_is_told(table: Surrogate, gap: Any) -> None:
-    message = "^k (at index 1 )?must be a number .*rigid"
+    message = "^k must be a number .*rigid"
     rest = without(CASE, "k", "v0")
     calls: list[Callable[[], Any]] = [
         lambda: table.evaluate(**{**CASE, "k": gap}),
@@ -364,7 +362,7 @@ def test_a_gap_is_no_rigid_contact_and_the_remedy_is_told(table: Surrogate, gap:
             {"v0": [0.01, 0.02], "mu_macro": [0.2, 0.2]}, "mu0", k=gap, **without(rest, "mu0")
         ),
     ]
-    for ask in calls[: 2 if isinstance(gap, list) else None]:
+    for ask in calls:
         with pytest.raises(InputError, match=message):
             ask()
     series = pd.Series([0.01, 0.02])

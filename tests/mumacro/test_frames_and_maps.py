@@ -43,11 +43,6 @@ def test_a_frame_has_one_row_a_case_with_what_was_requested(
     assert list(frame) == answer.paths
 
 
-def test_a_frame_of_labelled_cases_keeps_the_index(surrogate: Surrogate) -> None:
-    v0 = pytest.importorskip("pandas").Series([0.01, 0.1], index=["slow", "fast"])
-    assert surrogate.evaluate(**CASE, v0=v0).to_frame().index.tolist() == ["slow", "fast"]
-
-
 def test_the_map_of_a_normal_force_ends_where_it_lifts_off(surrogate: Surrogate) -> None:
     figure = pytest.importorskip("matplotlib.figure").Figure()
     normal = surrogate.plot(figure.add_subplot(), direction="normal")

@@ -45,10 +45,10 @@ NO_NUMBERS: dict[str, Any] = {
     "durations": np.array([1], dtype="timedelta64[s]"),
     "a time": np.datetime64("2020-01-01"),
     "text array": np.array(["fast"]),
-    "None in an array": [0.1, None],
     "records": np.zeros(3, dtype=[("a", "f8")]),
     "objects": np.array([object()]),
     "void": np.void(b"12345678"),
+    "truth values": [True, False],
     "long": ["x" * 100_000] * 100,
 }
 OUT_OF_BOUNDS = [-1.0, -1e6, -5e-324, -math.inf, math.nan, -1, np.float32(-1.0), np.int8(-3)]

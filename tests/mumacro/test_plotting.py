@@ -230,20 +230,6 @@ def test_an_interval_of_k_is_a_line_on_the_map(surrogate: Surrogate) -> None:
     assert f"{answer.mu_macro_low:.4g} to {answer.mu_macro_high:.4g}" in axes.get_title(loc="left")
 
 
-@pytest.mark.parametrize("library", ["pandas", "xarray", "dask"])
-def test_labelled_cases_are_drawn(surrogate: Surrogate, library: str) -> None:
-    if library == "dask":
-        v0 = pytest.importorskip("dask.array").from_array(SPEEDS, chunks=4)
-    elif library == "xarray":
-        v0 = pytest.importorskip("xarray").DataArray(SPEEDS, dims="v0")
-    else:
-        v0 = pytest.importorskip("pandas").Series(SPEEDS)
-    axes = surrogate.evaluate(**{**CASE, "v0": v0}).plot()
-    plain = surrogate.evaluate(**{**CASE, "v0": SPEEDS}).plot()
-    for line, other in zip(axes.lines, plain.lines, strict=True):
-        assert data(line) == data(other)
-
-
 def test_a_million_cases_are_drawn_as_dots(surrogate: Surrogate) -> None:
     answer = surrogate.evaluate(**{**CASE, "v0": np.geomspace(1e-4, 10.0, 10**6)})
     sizes = {line.get_markersize() for line in answer.plot().lines[1:]}

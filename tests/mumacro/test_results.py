@@ -137,22 +137,6 @@ def well_formed(text: str) -> bool:
     return not open_tags
 
 
-@pytest.mark.parametrize("library", ["pandas", "xarray", "dask"])
-def test_labelled_results_fit_16_lines_and_dask_is_not_computed(
-    surrogate: Surrogate, library: str
-) -> None:
-    v0: Any = np.geomspace(1e-4, 1.0, 300)
-    if library == "pandas":
-        v0 = pytest.importorskip("pandas").Series(v0)
-    else:
-        v0 = pytest.importorskip("xarray").DataArray(v0, dims="v0")
-        v0 = v0.chunk(50) if library == "dask" and pytest.importorskip("dask") else v0
-    answer = surrogate.evaluate(**without("v0"), v0=v0, include=("power",))
-    assert is_short(repr(answer))
-    assert well_formed(answer._repr_html_())
-    assert ("0.22" in repr(answer)) == (library != "dask")
-
-
 # --- one case: what the command prints ------------------------------------------------------------
 
 

@@ -18,8 +18,8 @@ from mumacro.fits.fitted import quantile
 from mumacro.fits.loop_fitted import LoopFit
 from mumacro.fits.profile import Profile
 from mumacro.inputs.cases import real
+from mumacro.inputs.columns import to_si
 from mumacro.inputs.kind import kind_of
-from mumacro.inputs.reading import read
 from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.kernel.binding import kernels
@@ -497,10 +497,7 @@ class _Loop:
 
 def _column(name: str, value: Any, quantity: str) -> Array:
     """Finite numbers in the order of time, (n,), in SI."""
-    one = read(name, value, quantity)
-    if one.std is not None or one.low is not None:
-        raise InputError(name, value, "without a deviation")
-    column = np.ascontiguousarray(one.si, np.float64)
+    column = np.ascontiguousarray(to_si(name, value, quantity))
     if column.ndim != 1 or not LEAST <= column.size <= MOST:
         bound = f"a column of {LEAST} to {MOST} samples: give some cycles, or each second sample"
         raise InputError(name, column.shape, bound)

@@ -9,12 +9,12 @@ import numpy as np
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import check, columns_of, library_of, no_such_input, select
+from mumacro.inputs.columns import to_si
 from mumacro.inputs.doubts import UNITS, Remark, remarks
 from mumacro.inputs.fields import LIKE, NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.layout import ColumnNames, Dialect
 from mumacro.inputs.names import unknown_name
-from mumacro.inputs.reading import NO_DEVIATION, read
 from mumacro.inputs.text_tables import Most, Table, read_table
 from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Bools
@@ -140,14 +140,9 @@ class Measured:
 
     def _read(self, data: dict[str, Any]) -> None:
         """Columns of one length, (n,), in SI."""
-        friction = read("mu_macro", data.pop("mu_macro"))
-        columns: dict[str, Any] = {"mu_macro": friction.si}
-        if STD in data:
-            columns[STD] = _number(STD, data.pop(STD))
-        elif friction.std is not None:
-            columns[STD] = friction.std
+        columns = {name: to_si(name, data.pop(name)) for name in ("mu_macro", STD) if name in data}
         # labels are dropped: a fit is not labelled
-        values = {name: _number(name, x) for name, x in data.items()}
+        values = {name: to_si(name, x) for name, x in data.items()}
         inputs = {**values, **dict.fromkeys(self.unknowns, 1.0)}
         self._has_f = inputs.get("f") is not None
         numbers = columns_of(inputs, self.kind)
@@ -244,7 +239,7 @@ class Measured:
                 raise InputError(name, "a column", "left out: it is fitted")
             if name in inputs:
                 raise InputError(name, inputs[name], "given once: in the cases or as a keyword")
-        values = {name: _number(name, value) for name, value in {**values, **inputs}.items()}
+        values = {name: to_si(name, value) for name, value in {**values, **inputs}.items()}
         if not values:
             return dict(self.columns)
         same = dict(self.columns)
@@ -296,26 +291,11 @@ def _friction(force: Any, load: Any) -> Any:
     here."""
     if load is None:
         raise InputError("Fz", None, f"given beside {FORCE}: mu_macro is {FORCE}/Fz")
-    numbers = {FORCE: read(FORCE, force, "force"), "Fz": read("Fz", load)}
-    for name, one in numbers.items():
-        if one.std is not None or one.low is not None:
-            raise InputError(name, force if name == FORCE else load, NO_DEVIATION)
-    above, below = (np.asarray(one.si, np.float64) for one in numbers.values())
+    above, below = np.asarray(to_si(FORCE, force)), np.asarray(to_si("Fz", load))
     if above.ndim and below.ndim and above.shape != below.shape:
         raise InputError("data", (above.shape, below.shape), "columns of one length")
     with np.errstate(all="ignore"):  # a load that is no number is refused by its name
         return np.where(below > 0.0, above / below, 0.0)
-
-
-def _number(name: str, value: Any) -> Any:
-    """A number or an array in SI, as for :meth:`mumacro.Surrogate.evaluate`, without a deviation or
-    an interval."""
-    one = read(name, value)
-    if one.low is not None:
-        raise InputError(name, value, "one number, not an interval")
-    if one.std is not None:
-        raise InputError(name, value, NO_DEVIATION)
-    return one.si
 
 
 def _refuse(name: str, column: Array, legal: Bools, bound: str) -> None:

@@ -14,6 +14,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from mumacro.errors import InputError
+from mumacro.inputs.carried import library, two_units
+from mumacro.inputs.columns import (
+    Column,
+    Fault,
+    in_unit,
+    is_column,
+    read_column,
+    refuse_gaps,
+    same_unit,
+    to_si,
+)
 from mumacro.inputs.fields import (
     BOUNDS,
     ENDS,
@@ -36,7 +47,7 @@ from mumacro.inputs.kind import (
 )
 from mumacro.inputs.names import in_place_of, suggestion
 from mumacro.inputs.numbers import check_signs
-from mumacro.inputs.reading import NO_DEVIATION, NUMBERS, in_unit, read
+from mumacro.inputs.reading import NO_DEVIATION, NUMBERS, Value, read
 from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Places, common_shape, flat
 
@@ -86,6 +97,8 @@ class Cases(NamedTuple):
     f: float | Array | None = None
     #: units that values carried, by the input as it came in
     units: dict[str, str] = {}  # noqa: RUF012 - never changed
+    #: gaps in columns, by the input as it came in and by case
+    faults: Mapping[str, Mapping[int, Fault]] = {}
 
     @classmethod
     def of(
@@ -105,18 +118,18 @@ class Cases(NamedTuple):
         if kind is None:
             kind = kind_of(*(values.get(name, word) for name, word in SPRING.names.items()))
         _refuse_other_amplitude(values, kind)
-        columns, std, ends, units, f = _inputs(values, kind.fields)
-        std |= _deviations(values, kind.fields, std)
+        columns, std, ends, units, f, gaps = _inputs(values, kind.fields)
+        if not values.keys().isdisjoint(DEVIATIONS):
+            std |= _deviations(values, kind.fields, std, gaps)
         shape = _shape_of(columns, std)
-        for part in (columns, std):
-            for name, x in part.items():
-                if isinstance(x, np.ndarray):
-                    part[name] = flat(x, shape) if x.size != 1 else x.item()
-        if isinstance(f, np.ndarray):
-            f = flat(f, shape) if f.size != 1 else f.item()
+        faults = _by_case(gaps, shape, strict) if gaps else {}
+        if shape:
+            columns = {name: _of_all(x, shape) for name, x in columns.items()}
+            std = {name: _of_all(x, shape) for name, x in std.items()}
+            f = None if f is None else _of_all(f, shape)
         if ends is not None:
             ends = _flat_ends(ends, shape, strict)
-        cases = cls(kind, columns, shape, ends, std, f, units)
+        cases = cls(kind, columns, shape, ends, std, f, units, faults)
         if strict or not shape:
             check(columns, f, (cases.size,) if shape else ())
         return cases._with_legal_deviations(strict or not shape) if std else cases
@@ -148,6 +161,9 @@ class Cases(NamedTuple):
 
     def reason(self, index: int) -> InputError:
         """Return why the case at ``index`` has no answer."""
+        for name, faults in self.faults.items():
+            if fault := faults.get(index):
+                return InputError(name, fault.entry, fault.reason.removeprefix("must be "))
 
         def at(x: Any) -> float:
             return float(x[index] if isinstance(x, np.ndarray) else x)
@@ -189,7 +205,7 @@ def named(cases: Any, keywords: Mapping[str, Any]) -> dict[str, Any]:
 
     Of a mapping every name must be one of :data:`COLUMNS` or :data:`OPTIONS`; of a data frame, an
     Arrow table or a Dataset other columns are ignored, and refused only where one resembles an
-    input that is missing.  Columns of Arrow become arrays.  InputError for a name given twice.
+    input that is missing.  InputError for a name given twice.
 
     >>> named({"mu0": 0.3, "contact": "ball"}, {"k": 1e6})
     {'mu0': 0.3, 'contact': 'ball', 'k': 1000000.0}
@@ -205,9 +221,6 @@ def named(cases: Any, keywords: Mapping[str, Any]) -> dict[str, Any]:
     for name in KIND:
         if name in values and type(values[name]) is not str:
             values[name] = one_word(name, values[name])
-    for name, value in values.items():
-        if type(value) not in _UNLABELLED and not library_of(value) and _of_arrow(value):
-            values[name] = np.asarray(value)  # NaN where it is null
     return values
 
 
@@ -284,6 +297,8 @@ def _columns_in(
 
         cases = pa.table(cases)
     try:
+        if type(cases).__name__ == "LazyFrame":  # of Polars, which warns where its columns are read
+            raise TypeError("it has no columns yet")
         # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars
         # have lists of names
         present: Any = (
@@ -292,14 +307,22 @@ def _columns_in(
             else getattr(cases, "column_names", None) or cases.columns
         )
         names = dict.fromkeys(names)  # in their order: the first one is named where two are wrong
-        columns = {name: cases[name] for name in names if name in present}
+        heads = {name: [(name, "")] for name in names if name in present}
         for head in present:
             name, unit = split_unit(head) if isinstance(head, str) else (head, None)
-            if unit is None or name not in names or head in names:
-                continue
-            if name in columns:
-                raise InputError(name, head, "given once")
-            columns[name] = in_unit(name, cases[head], unit)
+            if unit is not None and name in names and head not in names:
+                heads.setdefault(name, []).append((head, unit))
+        columns = {}
+        of_fields = _units_of_fields(cases)
+        for name, ((head, unit), *twice) in heads.items():
+            if twice:
+                raise InputError(name, twice[0][0], "given once")
+            of_field = of_fields.get(head, "") if name not in KIND else ""
+            if unit and of_field and not same_unit(name, unit, of_field):
+                raise two_units(name, of_field)
+            columns[name] = cases[head]
+            if unit or of_field:
+                columns[name] = in_unit(name, columns[name], unit or of_field)
         return columns, present
     except (AttributeError, TypeError, KeyError) as error:
         type_name = f"{type(cases).__module__}.{type(cases).__qualname__}".removeprefix("builtins.")
@@ -312,10 +335,17 @@ def _columns_in(
         ) from error
 
 
-def _of_arrow(value: Any) -> bool:
-    """Whether a column comes from Arrow, Polars or another library with Arrow's interface."""
-    value_type = type(value)
-    return hasattr(value_type, "__arrow_c_stream__") or hasattr(value_type, "__arrow_c_array__")
+def _units_of_fields(table: Any) -> dict[str, str]:
+    """The units in the metadata of the fields of an Arrow table, by column."""
+    if library(table) != "pyarrow":
+        return {}
+    units = {}
+    for field in table.schema:
+        metadata = field.metadata or {}
+        unit = metadata.get(b"units", metadata.get(b"unit", b"")).decode("utf-8", "replace")
+        if unit.strip():
+            units[field.name] = unit
+    return units
 
 
 def library_of(value: Any) -> str:
@@ -371,8 +401,9 @@ def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> 
 # --- an interval of k -----------------------------------------------------------------------------
 
 
-def ends_in(values: Mapping[str, Any]) -> tuple[Any, Any] | None:
-    """Return lowest and highest k, each one number or an array, where an interval is given.
+def ends_in(values: Mapping[str, Any], gaps: "_Gaps | None" = None) -> tuple[Any, Any] | None:
+    """Return lowest and highest k, each one number or an array, where an interval is given; the
+    gaps of columns go into ``gaps``.
 
     Raise InputError for one end without the other, for k beside them, and for one pair that is no
     interval.
@@ -384,7 +415,7 @@ def ends_in(values: Mapping[str, Any]) -> tuple[Any, Any] | None:
         raise InputError(missing[0], None, "given [N/m] beside the other end of the interval")
     if "k" in values:
         raise InputError("k", values["k"], "left out beside an interval of it")
-    of_ends = [read(name, values[name]) for name in ENDS]
+    of_ends = [_understood(name, values[name], {} if gaps is None else gaps) for name in ENDS]
     for name, end in zip(ENDS, of_ends, strict=True):
         if end.std is not None:
             raise InputError(name, values[name], AN_END)
@@ -454,6 +485,8 @@ def columns_of(values: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, floa
     for name in values.keys() & DEVIATIONS.keys():
         raise InputError(name, values[name], NO_DEVIATION)
     inputs = _inputs(values, kind.fields)
+    for name, (column, _) in inputs.gaps.items():
+        refuse_gaps(name, column)
     for name in inputs.std:
         raise InputError(name, values.get(name, values.get("f")), NO_DEVIATION)
     if inputs.ends is not None:
@@ -462,6 +495,8 @@ def columns_of(values: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, floa
 
 
 _Numbers = dict[str, float | Array]
+#: columns with gaps, and their shape, by the input as it came in
+_Gaps = dict[str, tuple[Column, tuple[int, ...]]]
 
 
 class _Inputs(NamedTuple):
@@ -472,6 +507,33 @@ class _Inputs(NamedTuple):
     ends: tuple[Any, Any] | None
     units: dict[str, str]
     f: float | Array | None  #: where it was given
+    gaps: _Gaps
+
+
+def _understood(name: str, value: Any, gaps: _Gaps) -> Value:
+    """One value, or the numbers of a column, whose gaps go into ``gaps``."""
+    if not is_column(value):
+        return read(name, value)
+    column = read_column(name, value)
+    if column.faults:
+        gaps[name] = column, column.si.shape
+    return Value(column.si, unit=column.unit)
+
+
+def _by_case(gaps: _Gaps, shape: tuple[int, ...], strict: bool) -> dict[str, dict[int, Fault]]:
+    """The gaps of columns by the cases that they spoil; InputError for the first, where
+    ``strict``."""
+    faults = {}
+    for name, (column, of_column) in gaps.items():
+        places = np.broadcast_to(np.arange(column.si.size).reshape(of_column), shape).ravel()
+        faults[name] = {
+            case: column.faults[place]
+            for case, place in enumerate(places.tolist())
+            if place in column.faults
+        }
+        if strict:
+            refuse_gaps(name, column._replace(faults=faults[name]))
+    return faults
 
 
 def _inputs(values: Mapping[str, Any], fields: tuple[str, ...]) -> _Inputs:
@@ -479,11 +541,12 @@ def _inputs(values: Mapping[str, Any], fields: tuple[str, ...]) -> _Inputs:
     columns: _Numbers = {}
     units: dict[str, str] = {}
     std: _Numbers = {}
+    gaps: _Gaps = {}
     f: float | Array | None = None
-    texts = {name: x for name, x in values.items() if type(x) is str}
+    texts = [name for name, x in values.items() if type(x) is str]
     if len(texts) > 1:
-        check_signs(texts)
-    ends = ends_in(values)
+        check_signs({name: values[name] for name in texts})
+    ends = None if values.keys().isdisjoint(ENDS) else ends_in(values, gaps)
     for name in fields:
         source = name if name != "omega" else _frequency_in(values, fields)
         if name == "k" and ends is not None:
@@ -495,26 +558,26 @@ def _inputs(values: Mapping[str, Any], fields: tuple[str, ...]) -> _Inputs:
         if type(value) is not float and not (
             type(value) is np.ndarray and value.dtype is _FLOAT and value.ndim
         ):
-            quantity = read(source, value)
-            value = quantity.si
-            if quantity.unit:
-                units[source] = quantity.unit
-            if quantity.std is not None:
-                std[name] = quantity.std * field_of(source)[1]
-            if quantity.low is not None:
-                ends = quantity.low, quantity.high
+            one = _understood(source, value, gaps)
+            value = one.si
+            if one.unit:
+                units[source] = one.unit
+            if one.std is not None:
+                std[name] = one.std * field_of(source)[1]
+            if one.low is not None:
+                ends = one.low, one.high
         if source == "f":
             f = value
             value = _angular(value)
         columns[name] = value
-    return _Inputs(columns, std, ends, units, f)
+    return _Inputs(columns, std, ends, units, f, gaps)
 
 
 def _deviations(
-    values: Mapping[str, Any], fields: tuple[str, ...], within: Mapping[str, Any]
+    values: Mapping[str, Any], fields: tuple[str, ...], within: Mapping[str, Any], gaps: _Gaps
 ) -> _Numbers:
     """The deviations that are given beside the values, by field; ``within`` are those that stand in
-    the values themselves."""
+    the values themselves, and the gaps of columns go into ``gaps``."""
     std: _Numbers = {}
     for column in [column for column in DEVIATIONS if column in values]:
         name = DEVIATIONS[column]
@@ -525,7 +588,7 @@ def _deviations(
         if field in std or field in within:
             bound = f"left out beside that of {field}: give the deviation once"
             raise InputError(column, value, bound)
-        deviation = read(name, value)
+        deviation = _understood(column, value, gaps)
         if deviation.std is not None or deviation.low is not None:
             raise InputError(column, value, A_DEVIATION)
         std[field] = per * deviation.si
@@ -535,7 +598,9 @@ def _deviations(
 def _refuse_other_amplitude(values: Mapping[str, Any], kind: Kind) -> None:
     """Raise InputError for the amplitude of another direction, unless its column is empty."""
     name = kind.other_amplitude
-    if name in values and (values[name] is None or not np.isnan(read(name, values[name]).si).all()):
+    if name in values and (
+        values[name] is None or not np.isnan(_understood(name, values[name], {}).si).all()
+    ):
         raise other_amplitude(name, values[name], kind)
 
 
@@ -558,13 +623,20 @@ def _flat_ends(ends: tuple[Any, Any], shape: tuple[int, ...], strict: bool) -> t
     return low, high
 
 
-def _shape_of(*parts: Mapping[str, Any]) -> tuple[int, ...]:
+def _of_all(x: float | Array, shape: tuple[int, ...]) -> float | Array:
+    """A column as one number, or flat with one for each case."""
+    if not isinstance(x, np.ndarray):
+        return x
+    return flat(x, shape) if x.size != 1 else x.item()
+
+
+def _shape_of(columns: _Numbers, std: _Numbers) -> tuple[int, ...]:
     """The shape to which all columns broadcast; InputError where they do not."""
-    columns = {name: x for part in parts for name, x in part.items() if isinstance(x, np.ndarray)}
+    arrays = [x for x in (*columns.values(), *std.values()) if isinstance(x, np.ndarray)]
     try:
-        return common_shape(columns.values())
+        return common_shape(arrays) if arrays else ()
     except ValueError as error:
-        shapes = {name: x.shape for name, x in columns.items()}
+        shapes = {name: np.shape(x) for name, x in (columns | std).items() if np.ndim(x)}
         raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
 
 
@@ -603,14 +675,8 @@ def _frequency_in(values: Mapping[str, Any], fields: tuple[str, ...]) -> str:
 
 
 def real(name: str, value: Any) -> Array:
-    """A value as an array of float64, exact: InputError where it has a deviation or is an
-    interval."""
-    quantity = read(name, value)
-    if quantity.std is not None:
-        raise InputError(name, value, NO_DEVIATION)
-    if quantity.low is not None:
-        raise InputError(name, value, "one value: only evaluate and its forms take intervals")
-    return np.asarray(quantity.si)
+    """Return a value as an array of float64, exact, as :func:`mumacro.inputs.columns.to_si`."""
+    return np.asarray(to_si(name, value))
 
 
 def check(

@@ -118,6 +118,7 @@ QUANTITY_OF = {row.name: row.quantity for row in _ROWS} | {
     "x": "length",
     "y": "length",
     "normal": "force",
+    "Ft": "force",
     "phase": "angle",
     "v_rest": "speed",
     "stiffness": "stiffness",

@@ -5,13 +5,11 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
-
 from mumacro.errors import InputError
+from mumacro.inputs.columns import to_si
 from mumacro.inputs.fields import QUANTITY_OF
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.numbers import read_number, tidy
-from mumacro.inputs.reading import NO_DEVIATION, read
 
 MOST_HARMONIC = 1000
 WHOLE = (
@@ -155,7 +153,4 @@ def _phase(name: str, value: Any) -> Any:
 
 def _plain(name: str, value: Any, quantity: str) -> Any:
     """Numbers in SI without a deviation."""
-    one = read(name, value, quantity)
-    if one.std is not None and np.any(one.std):
-        raise InputError(name, value, NO_DEVIATION)
-    return one.si
+    return to_si(name, value, quantity)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.cases import real
+from mumacro.inputs.carried import carried_unit
+from mumacro.inputs.columns import to_si
 from mumacro.inputs.oscillation import MOST_HARMONIC
-from mumacro.inputs.reading import carries_unit, read
 from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array
 from mumacro.results import Result
@@ -125,7 +125,8 @@ def harmonics(samples: Numbers, periods: int = 1, most: int = 20) -> Harmonics:
 
 def _samples(samples: Any) -> Array:
     """Finite numbers, (n,), n >= 3, in SI."""
-    values = real("samples", _in_si(samples) if carries_unit(samples) else samples)
+    has_unit = carried_unit(samples) is not None
+    values = np.asarray(_in_si(samples) if has_unit else to_si("samples", samples))
     if values.ndim != 1 or values.size < 3:
         raise InputError("samples", values.shape, "a list of 3 numbers or more")
     if not np.isfinite(values).all():
@@ -138,9 +139,9 @@ def _samples(samples: Any) -> Array:
 def _in_si(samples: Any) -> Any:
     """Samples that carry a unit, of a length or of a force."""
     try:
-        return read("samples", samples, "length").si
+        return to_si("samples", samples, "length")
     except InputError:
-        return read("samples", samples, "force").si
+        return to_si("samples", samples, "force")
 
 
 def _spectrum(scaled: Array, scale: float, periods: int, most: int) -> Harmonics:

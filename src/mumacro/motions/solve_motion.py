@@ -14,10 +14,11 @@ import numpy as np
 from mumacro import plotting
 from mumacro.errors import InputError
 from mumacro.inputs.cases import real
+from mumacro.inputs.columns import to_si
 from mumacro.inputs.fields import RAD_PER_CYCLE, unit_of
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.oscillation import read_oscillation
-from mumacro.inputs.reading import read, read_one
+from mumacro.inputs.reading import read_one
 from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array
 from mumacro.motions.motion import PARTS, motion
@@ -269,7 +270,7 @@ class Curve:
         value = self.case.get(name)
         if value is None:
             raise InputError(name, None, f"given [{unit_of(name)}]")
-        one = np.asarray(read(name, value).si)
+        one = np.asarray(to_si(name, value))
         if one.size != 1:
             raise InputError(name, value, "one number: a search has one motion")
         return float(one.ravel()[0])

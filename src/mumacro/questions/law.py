@@ -13,6 +13,7 @@ from mumacro.answer import BAND, Answer
 from mumacro.contacts.stiffening import Stiffening, stiffening_of
 from mumacro.errors import InputError
 from mumacro.inputs.cases import DEVIATIONS, Cases, fixed_inputs, named, without_interval
+from mumacro.inputs.columns import is_column, to_si
 from mumacro.inputs.fields import ENDS, NAMES, POSITIVE, QUANTITY_OF, field_of, unit_of
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.inputs.reading import read, read_one
@@ -157,7 +158,7 @@ def _end(along: str, name: str, value: Any) -> float:
 
 def _ascending(along: str, values: Any) -> Array:
     """Values of the swept input, (n,)."""
-    x = np.asarray(read("values", values, QUANTITY_OF[along]).si)
+    x = np.asarray(to_si("values", values, QUANTITY_OF[along]))
     if x.ndim != 1 or not x.size or not np.all(np.diff(x) >= 0.0):
         raise InputError("values", values, "one-dimensional and ascending")
     return x
@@ -168,7 +169,7 @@ def _apart(case: Mapping[str, Any], swept: str) -> tuple[dict[str, Any], dict[st
     inputs = named(None, {name: x for name, x in case.items() if x is not None or name == "k"})
     deviations = {name: inputs.pop(name) for name in DEVIATIONS if name in inputs}
     for name in inputs.keys() & QUANTITY_OF.keys():
-        if inputs[name] is None:
+        if inputs[name] is None or is_column(inputs[name]):
             continue
         one = read(name, inputs[name])
         if one.std is None:

@@ -8,6 +8,7 @@ import re
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from mumacro import InputError
@@ -15,7 +16,7 @@ from mumacro.inputs.doubts import remarks
 from mumacro.inputs.fields import INPUTS
 from mumacro.inputs.numbers import read_number
 from mumacro.inputs.oscillation import read_oscillation
-from mumacro.inputs.reading import read, read_column
+from mumacro.inputs.reading import read
 from mumacro.inputs.units import QUANTITIES, canonical, scale_in
 from tests.support.comparing import close
 
@@ -206,31 +207,21 @@ def test_every_unit_of_the_table_is_read_and_is_its_own_name() -> None:
         assert quantity.units[quantity.unit].si(1.0) == 1.0
 
 
-def test_entries_of_a_column_spoil_only_themselves() -> None:
-    column, reasons = read_column("k", [1e6, "rigid", "0.8..1.2N/um", "1±0.1", "x", None, ""])
-    assert column.si[:2].tolist() == [1e6, math.inf]
-    assert (column.low[2], column.high[2], column.low[0]) == close((0.8e6, 1.2e6, 1e6), rel=1e-15)
-    assert column.std[:4].tolist() == [0.0, 0.0, 0.0, 0.1]
-    assert [*reasons] == [4, 5, 6]
-    assert np.isnan(column.si[4:]).all()
-
-
 @pytest.mark.parametrize(
-    "value", [decimal.Decimal("0.5"), np.float32(0.5), np.ma.array(0.5), [0.5], (0.5,), np.int8(1)]
+    "value", [decimal.Decimal("0.5"), np.float32(0.5), np.ma.array(0.5), np.array(0.5), np.int8(1)]
 )
 def test_numbers_of_any_type_are_numbers(value: Any) -> None:
-    assert np.all(np.asarray(read("mu0", value).si) == float(np.ravel(value)[0]))
+    assert read("mu0", value).si == float(value)
 
 
 @pytest.mark.parametrize(
     "value",
     [
-        *(None, 1j, b"1", {}, {1}, [[1], [1, 2]], object(), [1j], np.datetime64("2026-01-01")),
-        *(True, np.bool_(True), np.array([True]), [1.0, True], bytearray(b"1"), np.array([b"1"])),
+        *(None, 1j, b"1", {}, {1}, object(), np.datetime64("2026-01-01"), pd.NA, pd.NaT),
+        *(True, np.bool_(True), np.array(True), bytearray(b"1"), np.array(b"1"), np.ma.masked),
         *(datetime.date(2026, 11, 27), datetime.timedelta(1), np.timedelta64(1, "s")),
-        *(np.array([1], "m8[s]"), (x for x in (1.0,)), float, np.zeros(1, [("a", float)])),
-        *(10**400, [10**400], decimal.Decimal("1e400"), np.longdouble(1e300) * 1e300),
-        np.array([1.0, np.longdouble(1e300) * 1e300]),
+        *((x for x in (1.0,)), float, np.zeros((), [("a", float)]), [1.0], (1.0, 2.0)),
+        *(10**400, decimal.Decimal("1e400"), np.longdouble(1e300) * 1e300, np.ones(2)),
     ],
 )
 def test_what_is_no_number_is_refused_by_its_name(value: Any) -> None:

@@ -1,0 +1,220 @@
+"""The unit and the deviation that a value of another library carries, found by what it can do: of
+pint, astropy, unyt, xarray, pandas, h5py, netCDF4 and uncertainties none is imported."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mumacro.errors import InputError
+from mumacro.inputs.units import QUANTITIES, Scale, bound_of_unit, is_level, scale_in, unit_in
+
+# of a unit that turns: without one of them 1/s is a frequency, with one of them it is none
+_ANGLES = ("rad", "deg", "°", "turn", "rev", "cycle", "rpm", "arc")
+# whose values never say a unit
+_PLAIN = ("builtins", "numpy", "polars", "pyarrow", "dask")
+
+
+def library(value: Any) -> str:
+    """Return the name of the package that the type of a value comes from."""
+    return type(value).__module__.partition(".")[0]
+
+
+class Plain(NamedTuple):
+    """What a value that carries a unit holds, and what leads to SI."""
+
+    numbers: Any
+    scale: Scale
+    unit: str  #: as the table of units writes it
+
+
+def carried_unit(value: Any) -> Any:
+    """Return the unit that a value carries, an object of its library or a text; None without one.
+
+    ``attrs`` of xarray, pandas, h5py and netCDF4 have it by the name ``units`` or ``unit``; those
+    of a frame by the name of the column.
+
+    >>> carried_unit(2.0) is None
+    True
+    """
+    package = library(value)
+    if package in _PLAIN:
+        return None
+    if package == "pandas":
+        unit = getattr(getattr(value, "dtype", None), "units", None)  # of pint-pandas
+    elif package == "xarray":
+        unit = _unit_of_quantity(getattr(value, "data", None))
+    else:
+        unit = _unit_of_quantity(value)
+    if unit is None:
+        attributes: Any = getattr(value, "attrs", None)
+        if hasattr(attributes, "get"):
+            unit = attributes.get("units", attributes.get("unit"))
+            if isinstance(unit, Mapping):  # of a frame
+                unit = unit.get(getattr(value, "name", None))
+    if isinstance(unit, np.ndarray) and unit.size == 1:
+        unit = unit.item()
+    if isinstance(unit, bytes):
+        unit = unit.decode("utf-8", "replace")
+    return None if isinstance(unit, str) and not unit.strip() else unit
+
+
+def _unit_of_quantity(value: Any) -> Any:
+    """The unit of a quantity of pint, astropy, unyt and others like them."""
+    for attribute in ("units", "unit"):
+        unit = getattr(value, attribute, None)
+        if unit is not None and not callable(unit) and unit is not value:
+            return unit
+    return None
+
+
+def without_carried_unit(name: str, value: Any, unit: Any, quantity: str) -> Plain:
+    """Return what a value holds whose ``unit`` is that of :func:`carried_unit`.
+
+    Raise InputError for a unit that the input cannot have.
+    """
+    text = _text_of(unit)
+    scale = scale_in(quantity, text) or scale_in(quantity, str(unit))
+    if scale is None:
+        si = _converted(value, text, QUANTITIES[quantity].unit, quantity)
+        if si is None:
+            raise InputError(name, _shown(value, text), _bound(quantity, value, text))
+        scale, value = Scale(), si
+    return Plain(_numbers(value), scale, unit_in(quantity, text))
+
+
+def scale_of_carried(name: str, unit: Any, quantity: str) -> Scale:
+    """Return the scale of a carried unit, without looking at the numbers.
+
+    Raise InputError for a unit that the input cannot have.
+    """
+    text = _text_of(unit)
+    scale = scale_in(quantity, text) or scale_in(quantity, str(unit))
+    if scale is None and not isinstance(unit, str):
+        one = _converted(1.0 * unit, text, QUANTITIES[quantity].unit, quantity)
+        scale = None if one is None else Scale(float(_magnitude(one)))
+    if scale is None:
+        raise InputError(name, _shown(None, text), _bound(quantity, None, text))
+    return scale
+
+
+def labelled_in_si(name: str, column: Any, quantity: str, scale: Scale | None = None) -> Any:
+    """Return an array of xarray or Dask with the same labels and chunks and numbers in SI, still
+    lazy; ``scale`` is that of its header.
+
+    Raise InputError for a unit that the input cannot have, and for two that differ.
+    """
+    unit = carried_unit(column)
+    if unit is not None:
+        own = scale_of_carried(name, unit, quantity)
+        if scale is not None and own != scale:
+            raise two_units(name, _text_of(unit))
+        scale = own
+    if library(column) != "xarray":
+        return column if scale is None else scale.si(column)
+    data = column.data
+    numbers = data if _unit_of_quantity(data) is None else _magnitude(data)
+    plain = column.copy(data=numbers if scale is None else scale.si(numbers))
+    plain.attrs = {}
+    return plain
+
+
+def two_units(name: str, unit: str) -> InputError:
+    """Return the error for a column whose header has another unit than its values carry."""
+    return InputError(name, f"values in {unit}", "in one unit: that of its header is another")
+
+
+def uncertain(value: Any) -> tuple[float, float] | None:
+    """Return value and deviation of a number of the package uncertainties, or of one like it."""
+    nominal, deviation = (getattr(value, name, None) for name in ("nominal_value", "std_dev"))
+    if nominal is None or deviation is None or callable(deviation):
+        return None
+    return float(nominal), float(deviation)
+
+
+def without_mask(value: Any) -> Any:
+    """Return a masked array of NumPy or astropy as a plain one, with NaN or None where it is
+    masked; another value as it is."""
+    if isinstance(value, np.ma.MaskedArray):
+        plain, mask = value.data, np.ma.getmaskarray(value)
+    elif hasattr(value, "unmasked") and hasattr(value, "mask"):
+        plain, mask = np.asarray(value.unmasked), np.asarray(value.mask)
+    else:
+        return value
+    gap, dtype = (math.nan, np.float64) if plain.dtype.kind in "fiu" else (None, object)
+    array = np.array(plain, dtype)
+    array[mask] = gap
+    return array if array.ndim else array.item()
+
+
+def _magnitude(value: Any) -> Any:
+    """The number of a quantity, without its unit."""
+    for attribute in ("magnitude", "value", "values"):
+        number = getattr(value, attribute, None)
+        if number is not None and not callable(number):
+            return number
+    return np.asarray(value)
+
+
+def _numbers(value: Any) -> Any:
+    """What a value that carries a unit holds, without labels and unit."""
+    package = library(value)
+    if package == "pandas":
+        array = value.array
+        return _magnitude(array.quantity) if hasattr(array, "quantity") else array
+    if package == "xarray":
+        data = value.data
+        return np.asarray(data) if _unit_of_quantity(data) is None else _numbers(data)
+    if hasattr(value, "attrs") or package == "netCDF4":  # an array in a file
+        return value[...]
+    return _magnitude(value.quantity if package == "pint_pandas" else value)
+
+
+def _text_of(unit: Any) -> str:
+    """A unit as text: short where its library can write it so."""
+    if isinstance(unit, str):
+        return unit
+    try:
+        return format(unit, "~C")  # of pint
+    except (TypeError, ValueError):
+        return str(unit)
+
+
+def _converted(value: Any, text: str, unit: str, quantity: str) -> Any:
+    """A quantity that its own library has converted to an SI unit; None where it cannot be.
+
+    For a frequency libraries take a radian, and a turn, as a plain 1: a factor of 2 pi.
+    """
+    if not hasattr(value, "to") or is_level(text):
+        return None
+    turns = any(word in text.lower() for word in _ANGLES)
+    hertz = "hz" in text.lower() or "hertz" in text.lower()
+    if quantity in ("angular frequency", "angle") and (hertz or not turns):
+        return None
+    if quantity == "frequency" and turns:
+        return None
+    for target in (unit, "dimensionless", "") if unit == "-" else (unit,):
+        try:
+            return value.to(target)
+        except Exception:  # noqa: S112 (each library has errors of its own)
+            continue
+    return None
+
+
+def _bound(quantity: str, value: Any, unit: str) -> str:
+    try:
+        number = float(_numbers(value))
+    except (TypeError, ValueError):
+        number = math.nan
+    if math.isnan(number):
+        return QUANTITIES[quantity].bound
+    return bound_of_unit(quantity, number, unit)
+
+
+def _shown(value: Any, unit: str) -> str:
+    """A quantity in a message."""
+    try:
+        return f"{float(_numbers(value)):.12g} {unit or 'without dimension'}"
+    except (TypeError, ValueError):
+        return f"a value in {unit or 'no unit'}"

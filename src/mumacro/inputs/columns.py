@@ -1,0 +1,315 @@
+"""Columns of a program: arrays of any library become float64 in SI.
+
+A column holds numbers, and its unit belongs to all of it: the unit of a quantity array, one that
+its container says, or that of its header.  A text or None among numbers is a gap, whose reason is
+kept; a column of texts alone is refused, and so are complex numbers, times and truth values.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mumacro.errors import InputError
+from mumacro.inputs.carried import (
+    carried_unit,
+    labelled_in_si,
+    library,
+    scale_of_carried,
+    two_units,
+    uncertain,
+    without_carried_unit,
+    without_mask,
+)
+from mumacro.inputs.fields import GAP, QUANTITY_OF, is_rigid
+from mumacro.inputs.reading import (
+    A_NUMBER,
+    NO_DEVIATION,
+    NUMBERS,
+    OR_RIGID,
+    Value,
+    as_double,
+    is_gap,
+    other_number,
+    read,
+)
+from mumacro.inputs.units import QUANTITIES, scale_in
+from mumacro.kernel.arrays import Array
+
+_FLOAT = np.dtype(np.float64)
+_REAL = "fiu"  # kinds of arrays of real numbers
+_NO_NUMBERS = {"b": "truth values", "c": "complex numbers", "M": "times", "m": "durations"}
+_NO_ARRAY = (str, bytes, bytearray, Mapping, set, frozenset, type)
+NOT_TEXT = "must be a number, not a text"
+
+
+class Fault(NamedTuple):
+    """Why an entry of a column has no number: the entry, and the reason as a sentence without its
+    subject."""
+
+    entry: object
+    reason: str
+
+
+class Column(NamedTuple):
+    """A column as it was understood."""
+
+    si: Array  #: in the shape of the column, NaN at gaps; infinite where a contact is rigid
+    unit: str | None = None  #: that was understood; None: the numbers are in SI
+    faults: Mapping[int, Fault] = {}  #: by place in the flattened column
+
+
+def is_column(value: Any) -> bool:
+    """Whether a value is an array of some library, a list or a tuple: not one value alone.
+
+    >>> is_column([1.0]), is_column(np.float64(1.0)), is_column("1"), is_column(np.array(1.0))
+    (True, False, False, False)
+    """
+    of_type = type(value)
+    if of_type in NUMBERS or of_type is str:
+        return False
+    if of_type is Column or of_type is list or of_type is tuple:
+        return True
+    if of_type is Value:
+        return False
+    dimensions = getattr(value, "ndim", None)
+    if isinstance(dimensions, int):
+        return dimensions > 0
+    if isinstance(value, _NO_ARRAY):
+        return False
+    return hasattr(of_type, "__len__") or hasattr(of_type, "__arrow_c_stream__")
+
+
+def read_column(name: str, values: Any, quantity: str = "", unit: str = "") -> Column:
+    """Return a column of an input, or of another argument, as float64 in SI.
+
+    Parameters
+    ----------
+    name : str
+        Of the input, for messages; :data:`mumacro.inputs.fields.QUANTITY_OF` has what it measures.
+    values : array_like
+        An array of doubles is not copied.  A :class:`Column` has been read before.
+    quantity : str
+        What it measures, for a name that is not in the list.
+    unit : str
+        That of its header or field.
+
+    Raises
+    ------
+    InputError
+        A column of texts alone, of what is no real number, in a unit that the input cannot have.
+
+    Examples
+    --------
+    >>> column = read_column("k", [1e6, "rigid", "1 N/um", None])
+    >>> column.si.tolist()
+    [1000000.0, inf, nan, nan]
+    >>> {place: fault.reason for place, fault in column.faults.items()}
+    {2: 'must be a number, not a text', 3: 'is missing; write rigid or a number'}
+    >>> read_column("y0", np.array([2.0, 3.0]), unit="um").si.tolist()
+    [2e-06, 3e-06]
+    """
+    of_type = type(values)
+    if of_type is np.ndarray and values.dtype is _FLOAT and not unit:
+        return Column(values)
+    if of_type is Column:
+        return values  # type: ignore[no-any-return]
+    quantity = quantity or QUANTITY_OF.get(name.removeprefix("std_"), "ratio")
+    scale = scale_in(quantity, unit) if unit else None
+    if unit and scale is None:
+        raise InputError(name, f"a column in {unit}", QUANTITIES[quantity].bound)
+    own = carried_unit(values)
+    if own is not None:
+        if scale is not None and scale_of_carried(name, own, quantity) != scale:
+            raise two_units(name, str(own))
+        values, scale, unit = without_carried_unit(name, values, own, quantity)
+    si, faults = _doubles(name, values, quantity)
+    in_si: Any = si if scale is None else scale.si(si)  # type: ignore[arg-type]  # of an array
+    return Column(in_si, unit or None, faults)
+
+
+def to_si(name: str, value: Any, quantity: str = "") -> Any:
+    """Return a number as a float, or a column as an array of float64, in SI.
+
+    Raise InputError for a value with a deviation, for an interval, and for a gap.
+
+    >>> to_si("y0", "2 um"), to_si("y0", [2e-6, 3e-6]).tolist()
+    (2e-06, [2e-06, 3e-06])
+    """
+    if is_column(value):
+        column = read_column(name, value, quantity)
+        refuse_gaps(name, column)
+        return column.si
+    one = read(name, value, quantity)
+    if one.std is not None:
+        raise InputError(name, value, NO_DEVIATION)
+    if one.low is not None:
+        raise InputError(name, value, "one value: only evaluate and its forms take intervals")
+    return one.si
+
+
+def refuse_gaps(name: str, column: Column) -> None:
+    """Raise InputError for the first gap of a column, with its place."""
+    for place, fault in column.faults.items():
+        bound = fault.reason.removeprefix("must be ")
+        raise InputError(name, fault.entry, bound, place)
+
+
+def same_unit(name: str, one: str, other: str) -> bool:
+    """Whether two units of an input have one scale.
+
+    >>> same_unit("v0", "mm/s", "mm s^-1"), same_unit("v0", "mm/s", "m/s")
+    (True, False)
+    """
+    quantity = QUANTITY_OF.get(name.removeprefix("std_"), "ratio")
+    return scale_in(quantity, one) == scale_in(quantity, other)
+
+
+def in_unit(name: str, value: Any, unit: str) -> Any:
+    """Return a column, or one value, whose header or field has a unit: in SI, or as it was
+    understood.
+
+    Arrays of xarray and Dask keep their labels and stay lazy.
+
+    >>> in_unit("y0", [2.0, 3.0], "um").si.tolist(), in_unit("y0", 2.0, "um").si
+    ([2e-06, 3e-06], 2e-06)
+    """
+    quantity = QUANTITY_OF.get(name.removeprefix("std_"), "ratio")
+    scale = scale_in(quantity, unit)
+    if scale is None:
+        raise InputError(name, f"a column in {unit}", QUANTITIES[quantity].bound)
+    if library(value) in ("xarray", "dask"):
+        return labelled_in_si(name, value, quantity, scale)
+    if is_column(value):
+        return read_column(name, value, quantity, unit)
+    one = read(name, value, quantity)
+    if one.unit is None:
+        return one.scaled(scale, unit)
+    if scale_in(quantity, one.unit) != scale:
+        raise two_units(name, one.unit)
+    return one
+
+
+# --- numbers of any container ---------------------------------------------------------------------
+
+
+def _doubles(name: str, values: Any, quantity: str) -> tuple[Array, dict[int, Fault]]:
+    """The numbers of a column without a unit, and its gaps."""
+    values = without_mask(values)
+    if isinstance(values, (list, tuple)):
+        shape, entries = _entries(name, values)
+        if NUMBERS.issuperset(map(type, entries)):
+            try:
+                return np.array(entries, np.float64).reshape(shape), {}
+            except OverflowError:
+                pass  # the entry beyond double range is found below
+        return _of_entries(name, values, entries, shape, quantity)
+    array = _array(name, values)
+    kind = array.dtype.kind
+    if kind in _REAL:
+        return as_doubles(name, array), {}
+    if kind in _NO_NUMBERS:
+        raise InputError(name, values, f"real numbers, not {_NO_NUMBERS[kind]}")
+    if kind not in "OUT":
+        raise InputError(name, values, A_NUMBER)
+    return _of_entries(name, values, array.ravel().tolist(), array.shape, quantity)
+
+
+def _array(name: str, values: Any) -> Any:
+    """An array of NumPy of a container."""
+    package = library(values)
+    if package == "pandas":
+        if hasattr(values, "columns"):
+            raise InputError(name, "a DataFrame", f"{A_NUMBER}: one column of it")
+        dtype = values.dtype
+        if dtype.kind in _REAL and not isinstance(dtype, np.dtype):  # with NA in place of NaN
+            return values.to_numpy(np.float64, na_value=math.nan)
+    elif package == "netCDF4" or (hasattr(values, "attrs") and package != "xarray"):
+        return without_mask(values[...])  # an array in a file
+    try:
+        return np.asarray(values)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(name, values, A_NUMBER) from None
+
+
+def as_doubles(name: str, array: Any) -> Array:
+    """Return an array of real numbers as doubles; InputError for one beyond their range."""
+    with np.errstate(over="ignore"):
+        doubles: Array = array.astype(np.float64, copy=False)
+    if array.dtype.itemsize > doubles.dtype.itemsize:
+        beyond = np.flatnonzero(np.isinf(doubles) & np.isfinite(array))
+        if beyond.size:
+            index = int(beyond[0])
+            as_double(name, array.flat[index], index)
+    return doubles
+
+
+def _entries(name: str, value: Sequence[Any]) -> tuple[tuple[int, ...], list[Any]]:
+    """Shape and entries of nested lists; InputError for lists of several lengths, and for an array
+    with a unit within a list."""
+    if not any(map(_is_row, value)):
+        return (len(value),), list(value)
+    try:
+        parts = [
+            (one.shape, one.ravel().tolist()) if type(one) is np.ndarray else _entries(name, [*one])
+            for one in value
+        ]
+    except (TypeError, RecursionError):
+        parts = [((), []), ((1,), [])]
+    if len({shape for shape, _ in parts}) > 1:
+        raise InputError(name, value, f"{A_NUMBER}, its lists of one length")
+    return (len(value), *parts[0][0]), [entry for _, entries in parts for entry in entries]
+
+
+def _is_row(value: Any) -> bool:
+    """Whether an entry of a list is a list or an array itself."""
+    if isinstance(value, (list, tuple)):
+        return True
+    dimensions = getattr(value, "ndim", 0)
+    return isinstance(dimensions, int) and dimensions > 0
+
+
+def _of_entries(
+    name: str, values: Any, entries: Sequence[Any], shape: tuple[int, ...], quantity: str
+) -> tuple[Array, dict[int, Fault]]:
+    """Entries of several types, one after the other."""
+    si, faults = np.full(len(entries), math.nan), dict[int, Fault]()
+    or_rigid = quantity in OR_RIGID and not name.startswith("std_")
+    numbers = texts = 0
+    for i, entry in enumerate(entries):
+        if type(entry) is float:
+            si[i] = entry
+            numbers += 1
+        elif type(entry) in NUMBERS:
+            si[i] = as_double(name, entry, i)
+            numbers += 1
+        elif is_gap(entry):
+            faults[i] = Fault(None, GAP if name == "k" else "is missing")
+        elif isinstance(entry, str):
+            if or_rigid and is_rigid(entry):
+                si[i] = math.inf
+            else:
+                texts += 1
+                faults[i] = Fault(entry, NOT_TEXT)
+        else:
+            si[i] = _number(name, entry, i)
+            numbers += 1
+    if texts and not numbers:
+        bound = (
+            f'a column of numbers, not of texts: write the unit into its header, as in "{name} '
+            f'[{QUANTITIES[quantity].unit}]", or convert the texts to numbers in SI'
+        )
+        raise InputError(name, values, bound)
+    return si.reshape(shape), faults
+
+
+def _number(name: str, entry: Any, index: int) -> float:
+    """A number of another type, such as Decimal; InputError for what is none."""
+    if carried_unit(entry) is not None:
+        bound = "numbers: the unit belongs to the whole column, as that of a quantity array"
+        raise InputError(name, entry, bound, index)
+    if uncertain(entry) is not None:
+        bound = f"numbers: give their deviations as a column std_{name}"
+        raise InputError(name, entry, bound, index)
+    return other_number(name, entry, index)
