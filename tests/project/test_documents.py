@@ -12,6 +12,7 @@ import pytest
 
 from builder.approximations import BORDERS, approximate_borders
 from mumacro import Surrogate, __version__
+from mumacro.cli.main import COMMANDS
 from tests.project.test_benchmarks import tables
 from tests.support import extended
 from tests.support.comparing import close
@@ -291,3 +292,9 @@ def test_metadata_agrees_with_the_package() -> None:
 def test_the_formulas_of_the_border_are_all_described() -> None:
     text = (DOCS / "how-to" / "law.md").read_text("utf-8")
     assert [column for column in BORDERS if column != "exact" and f"`{column}`" not in text] == []
+
+
+def test_the_completion_of_the_shell_knows_every_command() -> None:
+    text = (DOCS / "command-line.md").read_text("utf-8")
+    (words,) = re.findall(r'^complete -o default -W "(.*)" mumacro$', text, re.MULTILINE)
+    assert {*words.split()} == {*COMMANDS}
