@@ -23,6 +23,7 @@ from mumacro.inputs.kind import kind_of
 from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.kernel.binding import kernels
+from mumacro.stopping import look
 
 LEAST, MOST = 6, 50_000  # samples of a loop
 _PER_DECADE = 12
@@ -34,6 +35,7 @@ _STICKING = 0.02  # share of the samples that must stick, and slip
 # what is noted: standard deviations, share of mu0 Fz, share of the squares of the residuals
 _SURE, _LARGE, _EXPLAINED = 4.0, 0.02, 0.2
 _GAP = 0.1  # share of the range of the force between the ends of a cycle that is periodic
+_AT_ONCE = 500_000  # samples that the kernel follows between two looks at the flag that ends it
 _PIECES = 8  # of a cycle, at least, whose residuals count as independent
 _KERNEL = kernels[-1]
 _OTHER_SIGN = "the force is against the displacement: its sign is turned"
@@ -200,7 +202,12 @@ class _Loop:
 
     def _rows(self, p: Array, start: float) -> tuple[Array, Array]:
         """Force over mu0 of all samples, and its slope along ln p, for p = k/mu0 (m,)."""
-        return _KERNEL.loop_forces(self.code, p, self.x, self.Fz, self.before, start)
+        found = []
+        for piece in np.array_split(p, 1 + p.size * self.x.size // _AT_ONCE):
+            look()
+            found.append(_KERNEL.loop_forces(self.code, piece, self.x, self.Fz, self.before, start))
+        forces, slopes = zip(*found, strict=True)
+        return np.concatenate(forces), np.concatenate(slopes)
 
     def _profile(self, start: float, spare: float) -> Profile:
         """Least chi2 over s = ln(k/mu0); ``spare`` is the rise that is allowed, as a share of the
@@ -415,6 +422,7 @@ class _Loop:
         rows, _ = self._rows(np.exp(profile.at.s[allowed]), 0.0)
         ends = {name: list(around[name]) for name in self.names}
         for i, row in zip(allowed.tolist(), rows[:, self.counted], strict=True):
+            look()
             columns = np.column_stack([row, self.linear])
             inverse = np.linalg.pinv(columns.T @ columns)
             shares = inverse @ (columns.T @ self.measured)

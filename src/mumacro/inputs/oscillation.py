@@ -20,6 +20,11 @@ _FORM = (
     'an amplitude, a text such as "2um@90deg" or "2um, 3:0.4um@90deg", a pair (amplitude, phase '
     "in degrees), or a list of triples (harmonic, amplitude, phase in degrees)"
 )
+_SAMPLES = (
+    ">= 0: an array has one amplitude for each case, and a tuple of two is (amplitude, phase in "
+    "degrees); samples of a motion over its period are turned into harmonics by "
+    "mumacro.harmonics(samples).terms"
+)
 _MEMBERS = ("harmonic", "amplitude", "phase")
 #: harmonic, amplitude in SI, phase in degrees; both numbers or arrays
 Harmonic = tuple[int, Any, Any]
@@ -28,7 +33,8 @@ Harmonic = tuple[int, Any, Any]
 def read_oscillation(name: str, value: Any) -> list[Harmonic]:
     """The harmonics of x, y [m] or the normal force [N].
 
-    InputError names the part: ``x``, or ``x, harmonic``, ``x, amplitude``, ``x, phase``.
+    InputError names the part: ``x``, or ``x, harmonic``, ``x, amplitude``, ``x, phase``.  Of an
+    array of amplitudes none may be negative: samples of a motion are not taken for amplitudes.
 
     >>> read_oscillation("y", "2um, 3:0.5um@90deg")
     [(1, 2e-06, 0.0), (3, 5e-07, 90.0)]
@@ -52,6 +58,7 @@ def _parts(name: str, value: Any) -> list[tuple[Any, Any, Any]]:
     triples = isinstance(value, tuple) and all(map(_is_term, value))
     if isinstance(value, tuple) and not triples:
         if len(value) != 2:
+            _refuse_samples(name, value)
             raise InputError(name, value, f"{_FORM}; amplitudes of several cases are an array")
         return [(1, *value)]
     if isinstance(value, (list, tuple)) and all(
@@ -144,7 +151,22 @@ def _harmonic(name: str, value: Any) -> int:
 
 
 def _amplitude(name: str, value: Any) -> Any:
-    return _plain(f"{name}, amplitude", value, QUANTITY_OF[name])
+    size = _plain(f"{name}, amplitude", value, QUANTITY_OF[name])
+    if np.ndim(size):
+        _refuse_samples(name, size)
+    return size
+
+
+def _refuse_samples(name: str, values: Any) -> None:
+    """Raise InputError where one of several amplitudes is negative, as samples of a motion are."""
+    try:
+        numbers = np.asarray(values, np.float64).ravel()
+    except (TypeError, ValueError):
+        return
+    negative = np.flatnonzero(numbers < 0.0)
+    if negative.size:
+        index = int(negative[0])
+        raise InputError(f"{name}, amplitude", float(numbers[index]), _SAMPLES, index)
 
 
 def _phase(name: str, value: Any) -> Any:

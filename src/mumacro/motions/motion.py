@@ -37,12 +37,6 @@ PARTS = ("x", "y", "normal")
 _SPRINGS = 64  # the springs of a ball in a picture
 _AT_ONCE = 16, 1  # cases that a thread takes at a time: springs, balls
 _KERNEL = kernels[-1]
-# so many amplitudes, of which a quarter is negative, are the samples of a signal
-_MANY = 8
-_SAMPLES = (
-    ">= 0: an array is one amplitude for each case; samples of a motion over its period are turned "
-    "into harmonics by mumacro.harmonics(samples).terms"
-)
 _LIFTS_OFF = "an oscillation that leaves a load > 0 at every moment: at 0 the contact lifts off"
 _STILL = "> 0, or x or y an oscillation: the friction of a contact that does not move is not fixed"
 _RIGID = "finite: a rigid contact is the limit of a large k; raise it until mu_macro stays the same"
@@ -336,7 +330,8 @@ def motion(
     InputError
         A single value out of bounds; in arrays such a case is NaN.  At once for an input that is
         missing or without a meaning, a ball whose normal force oscillates, shapes that do not
-        broadcast.
+        broadcast, an array with a negative amplitude: it may hold samples, which
+        :func:`mumacro.harmonics` takes.
 
     Examples
     --------
@@ -390,9 +385,6 @@ def _terms(name: str, part: Any) -> Iterable[Term]:
     """The harmonics of one part of a motion; none for an amplitude 0."""
     for order, amplitude, degrees in read_oscillation(name, part):
         size = np.asarray(amplitude, np.float64)
-        if size.size >= _MANY and np.count_nonzero(size < 0.0) >= size.size / 4:
-            index = int(np.argmax(size.ravel() < 0.0))
-            raise InputError(f"{name}, amplitude", float(size.flat[index]), _SAMPLES, index)
         with np.errstate(invalid="ignore"):
             angle = np.deg2rad(np.fmod(np.asarray(degrees, np.float64), 360.0))
         if size.ndim or angle.ndim or size != 0.0 or not np.isfinite(angle):

@@ -51,7 +51,7 @@ class MotionRoot(NamedTuple):
 class MotionSolution(Solution):
     """All roots of every target, over a motion."""
 
-    root_type = MotionRoot
+    _root = MotionRoot
     #: for v0 without a root: the solution with x turned by 180 degrees, which moves the body the
     #: other way; None where that has no root either
     other_way: "MotionSolution | None"

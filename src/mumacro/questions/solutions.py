@@ -72,7 +72,7 @@ class Solution(Result):
     #: True when the unknown has no influence within the error, such as v0 without oscillation: a
     #: target then has one root, the whole range, or none
     constant: bool
-    root_type: ClassVar[Any]
+    _root: ClassVar[Any]
 
     @property
     def value(self) -> float:
@@ -161,7 +161,7 @@ class Solution(Result):
             for target, of_target in zip(self.targets, self.roots, strict=True)
             for root in of_target
         ]
-        names = ("target", *self.root_type._fields)
+        names = ("target", *self._root._fields)
         return {name: np.array([row[i] for row in rows]) for i, name in enumerate(names)}
 
     def _heading(self) -> str:

@@ -80,7 +80,7 @@ class Root(NamedTuple):
 class TableSolution(Solution):
     """All roots of every target, from a table."""
 
-    root_type = Root
+    _root = Root
     #: of an interval of k, whose geometric middle the rest is for: the solutions for its lowest and
     #: its highest value
     ends: tuple["TableSolution", "TableSolution"] | None = None

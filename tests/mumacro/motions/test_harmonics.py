@@ -140,20 +140,17 @@ def test_samples_that_are_given_as_amplitudes_are_refused_with_the_way_to_harmon
     name: str,
 ) -> None:
     samples = sampled([(1, 2e-6, 0.0)], 8)
-    values: tuple[Any, ...] = (
-        samples,
-        samples.tolist(),
-        [(2, samples, 0.0)],
-        samples.reshape(2, 4),
-    )
+    values: list[Any] = [samples, [(2, samples, 0.0)], samples.reshape(2, 4)]
+    # at every length; a tuple of two is (amplitude, phase), and may have a negative phase
+    for n in range(1, 9):
+        short = [2e-6] * (n - 1) + [-1e-6]
+        values += [np.array(short), short, *([tuple(short)] if n > 2 else [])]
     for value in values:
         with pytest.raises(InputError, match=r"mumacro\.harmonics") as caught:
             motion(**{**SCENE, name: value})
         assert caught.value.field == f"{name}, amplitude"
-    # a negative amplitude among others spoils its own case
-    assert np.isnan(motion(**SCENE, y=[2e-6] * 7 + [-1e-6]).mu_macro).tolist() == [False] * 7 + [
-        True
-    ]
+    pair: dict[str, Any] = {"y": (2e-6, -90.0)}
+    assert motion(**SCENE, **pair).mu_macro > 0.0
 
 
 def test_a_result_is_text_a_dict_and_a_frame() -> None:

@@ -627,9 +627,11 @@ def test_a_missing_input_is_named(name: str) -> None:
         motion(**scene, y=2e-6)
 
 
-@pytest.mark.parametrize(
-    ("change", "name", "text"), [bad for bad in BAD if bad[0] != {"k": "rigid"}]
-)
+# an array with a negative amplitude is refused as a whole: it may hold samples
+OF_ITS_CASE = [bad for bad in BAD if bad[0] not in ({"k": "rigid"}, {"y": -1e-6})]
+
+
+@pytest.mark.parametrize(("change", "name", "text"), OF_ITS_CASE)
 def test_in_an_array_such_a_case_is_nan_alone(change: dict[str, Any], name: str, text: str) -> None:
     del name, text
     good = motion(**SCENE, y=2e-6).mu_macro
