@@ -65,8 +65,8 @@ def pictures() -> None:
         for name, (address, width, height) in PICTURES.items():
             page = opening(address, width=width, height=height)
             time.sleep(0.5)
-            foot = page.run("return document.documentElement.scrollHeight;")
-            shown = foot if width > 760 else 2 * height
+            whole = page.run("return document.documentElement.scrollHeight;")
+            shown = whole if width > 760 else 2 * height
             clip = {"x": 0, "y": 0, "width": width, "height": shown, "scale": 1}
             options = {"format": "png", "captureBeyondViewport": True, "clip": clip}
             taken = opening.browser.execute_cdp_cmd("Page.captureScreenshot", options)["data"]

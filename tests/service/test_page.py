@@ -360,6 +360,18 @@ for (const plot of document.querySelectorAll('.plot')) {
         Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 3)
       found.push(`${plot.id}: ${name} and ${other}`);
   }));
+  // and none has a bar or the point on it
+  const frame = plot.querySelector('clipPath rect')?.getBBox();
+  const within = (one, box) => one.x >= box.x && one.x <= box.x + box.width &&
+    one.y >= box.y && one.y <= box.y + box.height;
+  for (const mark of plot.querySelectorAll('.deviation, .point'))
+    for (let at = 0; at <= mark.getTotalLength(); at += 4) {
+      const place = mark.getPointAtLength(at);
+      if (mark.matches('.deviation') && !within(place, frame)) continue;
+      const seen = place.matrixTransform(mark.getScreenCTM());
+      for (const [name, box] of all)
+        if (within(seen, box)) found.push(`${plot.id}: ${mark.getAttribute('class')} on ${name}`);
+    }
 }
 return found;
 """
@@ -367,7 +379,8 @@ return found;
 
 @pytest.mark.parametrize("width", [320, 375, 768, 1280, 1920])
 def test_no_text_of_a_plot_lies_on_another(open_page: Any, width: int) -> None:
-    for kind in ("", "contact=ball&direction=along", "direction=normal", "contact=rigid&k=rigid"):
+    kinds = ("", "contact=ball&direction=along", "direction=normal", "k=rigid", "k=0.1..10 N/um")
+    for kind in kinds:
         for law in ("", "&along=Fz", "&along=k&scale=linear", "&along=y0&v0=1e3"):
             page = open_page(f"#{kind}{law}&panel=motion", width=width, height=800)
             assert page.run(COVERED) == [], (kind, law)

@@ -251,6 +251,29 @@ def test_a_drag_is_one_step_and_the_map_stays_where_it_is(open_page: Any) -> Non
     assert page.value("#field-y0") == "2 µm"
 
 
+@pytest.mark.parametrize("width", [375, 761, 1024, 1181, 1280, 1500, 1920])
+@pytest.mark.parametrize("address", ["", "#k=1 ± 0.1 N/um&mu0=0.3 ± 0.02", "#k=0.1..10 N/um"])
+def test_nothing_that_is_pointed_at_moves(open_page: Any, width: int, address: str) -> None:
+    page = open_page(address, width=width, height=800)
+    place = (
+        "const [a, b] = ['#map', '#law'].map((one) => document.querySelector(one)"
+        ".getBoundingClientRect()); return [a, b].map(({ x, y, width, height }) =>"
+        " [x, y + scrollY, width, height]);"
+    )
+    before = page.run(place)
+    for plot in ("#map", "#law"):
+        for x in (0.3, 0.5, 0.7):
+            page.touched(plot, x, 0.5)
+            assert page.run(place) == before, (plot, x)
+        page.drag_begins(plot, 0.5, 0.5)
+        for step in (30, 30, -90):
+            page.drag_moves(step, 0)
+            page.settle()
+            assert page.run(place) == before, (plot, step)
+        page.drag_ends()
+        before = page.run(place)  # at the end of a drag, the texts are those of the new case
+
+
 def test_a_step_of_a_drag_draws_the_point_and_its_end_the_rest(open_page: Any) -> None:
     page = open_page(width=1280, height=800)
     page.run(

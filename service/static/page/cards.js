@@ -7,6 +7,7 @@ import { lawPanel } from "./law.js";
 import { mapPanel } from "./map.js";
 import { meaningsDialog } from "./meanings.js";
 import { motionPanel } from "./motion.js";
+import { Plot } from "./plot.js";
 import { sidePanel } from "./side.js";
 import { fromAddress } from "./state.js";
 import { stiffnessPanel } from "./stiffness.js";
@@ -32,6 +33,14 @@ export function cards(store, moved, aim, again) {
   );
   const motion = motionPanel(store, moved);
   meaningsDialog();
+  for (const [kind, media] of [
+    ["beforeprint", "all"],
+    ["afterprint", "print"],
+  ])
+    addEventListener(kind, () => {
+      $("on-paper").media = media;
+      Plot.fit();
+    });
   lawFields(store);
 
   const point = (answer, target) => map(answer, target?.mu_ratio);
@@ -64,7 +73,11 @@ function panels(store) {
     store.look({ panel: store.state.panel === "motion" ? "none" : "motion" }),
   );
   for (const button of document.querySelectorAll("[data-close]"))
-    button.addEventListener("click", () => store.look({ panel: "none" }));
+    button.addEventListener("click", () => {
+      const { panel } = store.state;
+      store.look({ panel: "none" });
+      $(`tab-${panel}`).focus();
+    });
   let shown; // what a link opens stays where it is, below the number
   return (panel) => {
     for (const [name, id] of Object.entries(parts)) $(id).hidden = name !== panel;

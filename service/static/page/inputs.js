@@ -36,14 +36,17 @@ export function choice(store, name, words, reasons = {}) {
 /** A text without what makes no difference: blanks, u in place of µ. */
 const asTyped = (text) => text.replaceAll(" ", "").replaceAll("µ", "u");
 
-/** What the service understood of the text that is typed, where that says more than the text. */
-function understood(name, typed, { text, value, unit, std, low, high } = {}) {
-  if (typeof value !== "number" || (text ?? typed) !== typed) return "";
+/**
+ * What the service understood of the text that is typed, where that says more than the text; in a
+ * drag it was another text of its form.
+ */
+function understood(name, typed, { text, value, unit, std, low, high } = {}, dragged = false) {
+  if (typeof value !== "number" || ((text ?? typed) !== typed && !dragged)) return "";
   if (low !== undefined && high !== undefined)
     return `${inUnit(name, low, unit ?? undefined)} to ${inUnit(name, high, unit ?? undefined)}`;
-  const said = inUnit(name, value, unitAt(name, value, unit, 1e4), 6);
+  const said = inUnit(name, value, unitAt(name, value, unit), 6);
   if (std) return `${said}, standard deviation ${inUnit(name, std, unit ?? undefined, 3)}`;
-  return text && asTyped(text) !== asTyped(said) ? `read as ${said}` : "";
+  return text && !dragged && asTyped(text) !== asTyped(said) ? `read as ${said}` : "";
 }
 
 /** `moved({ name: value [SI] })` takes a value that is dragged or stepped to. */
@@ -57,7 +60,7 @@ export function inputsPanel(store, moved) {
     const { label, symbol, note, meaning } = about.inputs[name];
     const rigid = name === "k" && store.state.contact === "rigid";
     const text = rigid ? "rigid" : store.state[name];
-    const below = fault ?? doubt ?? understood(name, text, answer?.inputs[name]);
+    const below = fault ?? doubt ?? understood(name, text, answer?.inputs[name], store.dragged);
     const movable = numberOf(answer?.inputs[name]) > 0 && !rigid;
     return html`
       <div class="field ${name === typing ? "" : fault ? "bad" : doubt ? "doubt" : ""}">

@@ -136,10 +136,13 @@ export function lawPanel(store, moved) {
       const x = plot.x(toUnit(law.along, value, unit()));
       inside.append("path").attr("class", "border").attr("d", `M${x} ${box.y}v${box.height}`);
       const left = x > box.x + box.width - 100;
+      // at the end of the line that is farther from the curve
+      const at = bisectCenter(law.values, value);
+      const above = plot.y(law.mu_macro[at]) > box.y + box.height / 2;
       plot.text(
         law.along === "v0" ? "critical speed" : "border",
         x + (left ? -5 : 5),
-        box.y + box.height - 6,
+        above ? box.y + 12 : box.y + box.height - 6,
         "mark",
         left ? "end" : "start",
       );
@@ -162,12 +165,8 @@ export function lawPanel(store, moved) {
     if (here === undefined) return;
     const x = toUnit(law.along, here, unit());
     if (answer.std) {
-      const ends = [Math.max(answer.mu_macro - answer.std, 0), answer.mu_macro + answer.std];
-      plot.path(
-        ends.map((mu) => [x, mu]),
-        "deviation",
-        plot.over,
-      );
+      const low = Math.max(answer.mu_macro - answer.std, 0);
+      plot.bar([x, low], [x, answer.mu_macro + answer.std]);
     }
     plot.point(x, answer.mu_macro);
   }

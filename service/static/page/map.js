@@ -144,14 +144,13 @@ export function mapPanel(store, moved, loaded) {
   /** The user's point, with a bar for its deviation or for the interval of k. */
   function point({ v_tilde: v, y_tilde: y }, inputs) {
     const [along, up] = [v ?? Infinity, y ?? Infinity];
-    const bar = (from, to) => plot.path([from, to], "deviation", plot.over);
     const [dv, dy] = [SPEED, AMPLITUDE[amplitude()]].map((names) => deviationOf(inputs, names));
-    if (dv) bar([along * Math.exp(-dv), up], [along * Math.exp(dv), up]);
-    if (dy && map.y_tilde.log) bar([along, up * Math.exp(-dy)], [along, up * Math.exp(dy)]);
+    if (dv) plot.bar([along * Math.exp(-dv), up], [along * Math.exp(dv), up]);
+    if (dy && map.y_tilde.log) plot.bar([along, up * Math.exp(-dy)], [along, up * Math.exp(dy)]);
     const { low, high, value } = inputs.k ?? {};
     if (low && high) {
       const at = (k) => [(along * k) / value, map.y_tilde.log ? (up * k) / value : up];
-      bar(at(low), at(high));
+      plot.bar(at(low), at(high));
     }
     plot.point(along, up);
   }

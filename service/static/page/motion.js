@@ -128,18 +128,18 @@ export function motionPanel(store, moved) {
       ["µ", "mean force along the drag, over Fz", known(mu)],
       ["drag force", "mean force along the drag: µ Fz", prefixed(force, "N")],
       ["µ across", "mean force across it, over Fz", known(motion.mu_lateral)],
-      ["sticks", "share of the period", `${show(100 * motion.stick_fraction, 3)} %`],
+      ["sticks", "share of the period", `${show(100 * motion.stick_fraction)} %`],
       ["slip path", SLIPS[motion.contact], amount(motion.slip_path, "m"), BEYOND],
       ["shaker power", "mean, along and across", amount(motion.power, "W"), BEYOND],
       [
-        "settles in",
-        "periods until a small disturbance has fallen to 1 %",
-        motion.periods === null ? "∞: nothing slips" : `${show(motion.periods, 3)} periods`,
+        "periods to settle",
+        "until a small disturbance has fallen to 1 %",
+        motion.periods === null ? "∞: nothing slips" : show(motion.periods),
       ],
       ["error ≈", "estimate of the numerical error of µ and of µ across", show(error, 2)],
     ]);
   }
-  const amount = (value, unit) => (value === null ? null : prefixed(value, unit, 3));
+  const amount = (value, unit) => (value === null ? null : prefixed(value, unit));
 
   /** The text of an unknown at a value [SI], and what the state becomes with it. */
   function found(unknown, value) {

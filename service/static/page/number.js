@@ -42,6 +42,13 @@ export function headline(answer, all) {
   return { value, std: deviation };
 }
 
+/** The number in one line of a phone: with the regime, where it has no deviation and no interval. */
+function shortOf(answer) {
+  const { value, std } = headline(answer, false);
+  if (std) return `µ = ${value} ± ${std}`;
+  return value.includes(" ") ? `µ = ${value}` : `µ = ${value}, ${inWords(answer.regime)}`;
+}
+
 /** Where the deviation of the number comes from. */
 function variance({ std_share: shares }) {
   const parts = Object.entries(shares ?? {}).filter(([, share]) => share >= 0.005);
@@ -112,10 +119,9 @@ export function numberPanel(store) {
     const deviation = std ? html`<wbr /><span id="std"> ± ${std}</span>` : nothing;
     render(html`<output id="mu" for="fields">${value}</output>${deviation}`, $("number"));
     const { stick_fraction: stick, regime } = answer;
-    const share = stick > 0 && stick < 1 ? `: sticks ${show(100 * stick, 2)} % of a period` : "";
+    const share = stick > 0 && stick < 1 ? `: sticks ${show(100 * stick, 2)} %` : "";
     write("regime", `${capital(inWords(regime))}${share}`);
-    const short = headline(answer, false);
-    write("short", `µ = ${short.value}${short.std ? ` ± ${short.std}` : ""}, ${inWords(regime)}`);
+    write("short", shortOf(answer));
     if (store.dragged) return; // words may grow, and would move the map that is dragged
     const [first, ...rest] = sayings(answer);
     write("advice", first ? `${heading(first.row)}: ${first.words}` : "");

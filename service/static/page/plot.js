@@ -5,6 +5,8 @@ import d3 from "./d3.js";
 const { axisBottom, axisLeft, axisRight, axisTop, drag, scaleLinear, scaleLog, select, line } = d3;
 
 const DIGIT = 7; // pixels of a figure beside an axis
+const MOST = 0.6; // of the width of a frame, which a text in it has
+const BAR = 40; // places of a bar, at which it may lie on a text
 const FINGER = 36; // pixels from the point, within which a finger takes it
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 /** Of an input, by one press of an arrow key; with Shift. */
@@ -70,6 +72,7 @@ function ticked(axis, scale, room, least = -Infinity) {
 }
 
 const scaleOf = ({ domain, log }) => (log ? scaleLog() : scaleLinear()).domain(domain);
+const plots = [];
 /** Whether two boxes [left, top, right, bottom] lie on each other. */
 const overlap = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
 
@@ -84,10 +87,20 @@ const overlap = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[
 export class Plot {
   constructor(svg, paint, mark = () => {}) {
     Object.assign(this, { svg, paint, mark, stale: true, centred: [] });
+    plots.push(this);
     new ResizeObserver(([{ contentRect }]) => {
       [this.width, this.height] = [contentRect.width, contentRect.height].map(Math.round);
       this.redraw();
     }).observe(svg);
+  }
+
+  /** Draws all plots at once in the size that they have now. */
+  static fit() {
+    for (const plot of plots) {
+      [plot.width, plot.height] = [plot.svg.clientWidth, plot.svg.clientHeight];
+      plot.stale = true;
+      plot.draw();
+    }
   }
 
   /** Draws both layers, in the next picture of the page. */
@@ -114,7 +127,9 @@ export class Plot {
     if (!this.marks) return;
     [this.inside, this.over] = this.marks;
     for (const group of this.marks) group.selectAll("*").remove();
+    this.covers = [];
     this.mark(this);
+    this.uncover();
   }
 
   /**
@@ -212,8 +227,8 @@ export class Plot {
   }
 
   /**
-   * Moves centred texts into the frame, and leaves out those that would lie on an earlier one; all
-   * are measured, then moved, which is one layout.
+   * Moves centred texts into the frame, and leaves out those that have no room beside the earlier
+   * ones; all are measured, then moved, which is one layout.
    */
   centre() {
     const { box, centred, svg } = this;
@@ -227,16 +242,29 @@ export class Plot {
       const { x, y, width, height } = text.getBBox();
       const place = [x - 1, y, x + width + 1, y + height];
       const left = this.texts.some((one) => !one.left && overlap(one.place, place));
-      this.texts.push({ text, place, left: left || (box && width > box.width) });
+      const wide = box && width > MOST * box.width;
+      this.texts.push({ text, place, left: left || wide });
     }
-    this.uncover();
   }
 
-  /** Shows the texts that have room, but those that the user's point lies on. */
-  uncover([x, y] = [-99, -99]) {
-    const point = [x - 8, y - 8, x + 8, y + 8];
+  /** Shows the texts that have room, but those that the user's point or its bar lies on. */
+  uncover() {
     for (const { text, place, left } of this.texts ?? [])
-      text.classList.toggle("covered", left || overlap(place, point));
+      text.classList.toggle("covered", left || this.covers.some((one) => overlap(place, one)));
+  }
+
+  /** A bar for what is open about the user's point, from one place to another. */
+  bar(from, to) {
+    const ends = [from, to].map(([x, y]) => [this.x(x), this.y(y)]);
+    const [[left, foot], [right, top]] = ends;
+    for (let i = 0; i <= BAR; i += 1)
+      this.cover(left + (i / BAR) * (right - left), foot + (i / BAR) * (top - foot), 3);
+    return this.path([from, to], "deviation");
+  }
+
+  /** Notes that something of the upper layer is drawn here. */
+  cover(x, y, half) {
+    this.covers.push([x - half, y - half, x + half, y + half]);
   }
 
   /** The user's point; where it is outside, an arrow on the frame that points to it. */
@@ -255,7 +283,7 @@ export class Plot {
     );
     const outside = right !== 0 || down !== 0;
     this.pointAt = place;
-    this.uncover(place);
+    this.cover(...place, 8);
     const turn = (Math.atan2(down, right) * 180) / Math.PI;
     return this.over
       .append("path")

@@ -102,9 +102,9 @@ function numbers(answer, all) {
       ...without("power", "not modelled"),
     ],
     [
-      "settles in",
-      "periods until a small disturbance has fallen to 1 %",
-      settling === undefined ? null : `${show(settling.periods ?? Infinity, 3)} periods`,
+      "periods to settle",
+      "until a small disturbance has fallen to 1 %",
+      settling === undefined ? null : show(settling.periods ?? Infinity, digits),
       ...without("settling", "across only"),
     ],
     ["ṽ", "v₀/(l₀ω), dimensionless speed", show(groups.v_tilde ?? Infinity, digits)],

@@ -142,7 +142,15 @@ export const prose = (text) =>
     .replace(/(\d) (?=%|µm|N\b|mm\b)/g, "$1\u00a0");
 
 /** Names of a request as the page calls them. */
-const CALLED = { start: "from", stop: "to", stiffness_exponent: "m", nu: "ν", nu2: "ν₂", E2: "E₂" };
+const CALLED = {
+  start: "from",
+  stop: "to",
+  stiffness_exponent: "m",
+  normal: "ΔFz",
+  nu: "ν",
+  E2: "E₂",
+  nu2: "ν₂",
+};
 
 /** A field of a request as the page calls it. */
 export function called(field) {
