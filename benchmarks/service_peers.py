@@ -1,4 +1,6 @@
-"""The servers for comparison: ``python -m benchmarks.service_peers raw|fastapi``.
+"""The servers that the service is compared with.
+
+    python -m benchmarks.service_peers raw|fastapi
 
 ``raw``: stock uvicorn and orjson, which reads six numbers and answers one, without checks: the cost
 of the server underneath.  ``fastapi``: models in and out around the same table, as in its tutorial.
