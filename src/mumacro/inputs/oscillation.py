@@ -5,6 +5,8 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
 from mumacro.errors import InputError
 from mumacro.inputs.columns import to_si
 from mumacro.inputs.fields import QUANTITY_OF
