@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
-from benchmarks.speed_against_error import Contender, Line, draw, grid_axis, on_grid, plot
+from benchmarks.peers import Contender, Line, draw, grid_axis, on_grid, plot
 from builder.solver.ball import Ball, Springs
 from mumacro import Surrogate
 from mumacro.table.atlas import MIDDLE

@@ -31,16 +31,27 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
 from pathlib import Path
 from time import process_time
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
-from scipy import ndimage
-from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator, make_interp_spline
+from scipy.interpolate import RectBivariateSpline, make_interp_spline
 
-from benchmarks import calls
+from benchmarks import ball, calls
 from benchmarks.blocks_in_numpy import BlocksInNumpy
+from benchmarks.peers import (
+    CUBIC,
+    ERROR,
+    LINEAR,
+    SPLINE,
+    SQUARE,
+    Array,
+    Contender,
+    draw,
+    grid_axis,
+    logarithmic,
+    on_grid,
+)
 from benchmarks.service import BATCH, FORMS, ask, batch
 from benchmarks.solver import march
 from builder.export.c import write_c
@@ -59,12 +70,7 @@ from mumacro.table.netcdf import write_table
 from mumacro.table.polynomials import Border
 from tests.support.serving import CASE, serving
 
-Array = NDArray[np.float64]
-Evaluate = Callable[[Array, Array], Array]
-# what a method is called, and its (largest error, ns a point)
-Line = tuple[str, list[tuple[float, float]]]
 FULL_GRIDS, QUICK_GRIDS = (64, 256, 1024), (24, 48)
-SQUARE = (1e-3, 1e3)  # of v~ and of y~
 WORKERS = os.cpu_count() or 1  # where no time is taken
 HEADER = (
     "method",
@@ -76,11 +82,6 @@ HEADER = (
     "99 % abs error",
 )
 OURS, IN_NUMPY = "blocks in C, with bound", "blocks in NumPy"
-LINEAR, CUBIC, SPLINE = (
-    "scipy RegularGridInterpolator linear",
-    "scipy map_coordinates order 3",
-    "scipy RectBivariateSpline.ev k=3",
-)
 PATCHES, RIGID = "two quintic patches fitted to the border", "eq. (35), rigid contact"
 #: line of a picture -> its name there, its colour and mark
 LOOKS = {
@@ -91,67 +92,12 @@ LOOKS = {
     SPLINE: ("log grid, cubic spline (scipy)", "#1f5fa8", "D"),
     PATCHES: ("two quintic patches along the border", "#e08214", "P"),
 }
-BETTER = "lower left is better"
-
-
-class Contender(NamedTuple):
-    """One method for mu~: ``evaluate(v~, y~)``, the size of its data, the solved numbers that it is
-    made of, and their bytes in memory."""
-
-    name: str
-    size: str
-    evaluate: Evaluate
-    solves: int = 0
-    memory: int = 0
-
-
-def grid_axis(n: int) -> Array:
-    return np.geomspace(*SQUARE, n)
 
 
 def solve_grid(sweep: Sweep, n: int) -> Array:
     """mu~ on the plain grid of ``n`` x ``n`` nodes, axis 0 along v~."""
     axis = grid_axis(n)
     return sweep.solve("full", axis[:, None], axis[None, :])["mu_ratio"]
-
-
-def _map_coordinates(x: Array, values: Array, order: Literal[1, 3]) -> Evaluate:
-    filtered: Array = (
-        ndimage.spline_filter(values, order=order, mode="nearest") if order > 1 else values
-    )
-    start, scale = x[0], 1.0 / (x[1] - x[0])
-
-    def evaluate(v: Array, y: Array) -> Array:
-        at = np.empty((2, v.size))
-        np.log(v, out=at[0])
-        np.log(y, out=at[1])
-        at -= start
-        at *= scale
-        out: Array = ndimage.map_coordinates(
-            filtered, at, order=order, mode="nearest", prefilter=False
-        )
-        return out
-
-    return evaluate
-
-
-def on_grid(values: Array) -> Iterator[Contender]:
-    """Interpolators on the plain grid that ``values`` (n, n) were solved on.
-
-    Others of scipy and xarray give the errors of these, for they interpolate alike, and take
-    longer.
-    """
-    n = values.shape[0]
-    x = np.log(grid_axis(n))
-    linear, cubic = RegularGridInterpolator((x, x), values), RectBivariateSpline(x, x, values)
-    methods: dict[str, Evaluate] = {
-        LINEAR: lambda v, y: np.asarray(linear(np.log(np.stack((v, y), axis=1)))),
-        SPLINE: lambda v, y: np.asarray(cubic.ev(np.log(v), np.log(y))),
-        "scipy map_coordinates order 1": _map_coordinates(x, values, 1),
-        CUBIC: _map_coordinates(x, values, 3),
-    }
-    for name, evaluate in methods.items():
-        yield Contender(name, f"{n} x {n}", evaluate, n * n, 8 * n * n)
 
 
 def fitted_to_the_border(sweep: Sweep, n: int) -> Contender:
@@ -190,11 +136,6 @@ def fitted_to_the_border(sweep: Sweep, n: int) -> Contender:
 
     solves = 2 * n * n + 4 * n
     return Contender(PATCHES, f"2 x {n} x {n}", evaluate, solves, 8 * solves)
-
-
-def draw(n: int, seed: int) -> Array:
-    low, high = np.log(SQUARE)
-    return np.exp(np.random.default_rng(seed).uniform(low, high, (2, n)))
 
 
 def tables() -> list[Surrogate]:
@@ -637,41 +578,6 @@ def tails(points: int, rounds: int, quick: bool) -> str:
 # --- pictures -------------------------------------------------------------------------------------
 
 
-def plot(lines: list[Line], path: Path) -> None:
-    """The picture of all methods: ns a point against the largest error, one line a method."""
-    colors = ("#c1272d", "#1f5fa8", "#2a8c8c", "#8a8a8a", "#b07aa1", "#e08214", "#222222")
-
-    def drawn(axes: Any) -> None:
-        for (name, points), color in zip(lines, colors, strict=True):
-            axes.plot(*zip(*points, strict=True), "o-", label=name, color=color, lw=1.5)
-        axes.set(xlabel=ERROR, ylabel="ns per point, one thread")
-        _logarithmic(axes)
-        axes.set_ylim(bottom=7.0)
-        axes.legend(fontsize=9, loc="upper left")
-
-    save(path, drawn, Panels(size=(9.5, 5.0)), dpi=100)
-
-
-ERROR = r"error of $\tilde\mu$ over $\tilde v$, $\tilde y$ from 0.001 to 1000"
-
-
-def _logarithmic(axes: Any) -> None:
-    """Both scales, and which way is better."""
-    axes.set(xscale="log", yscale="log")
-    axes.minorticks_off()
-    axes.annotate(
-        BETTER,
-        (0.01, 0.015),
-        (0.1, 0.06),
-        xycoords="axes fraction",
-        textcoords="axes fraction",
-        arrowprops={"arrowstyle": "->", "color": "#555555"},
-        color="#555555",
-        style="italic",
-        fontsize=9,
-    )
-
-
 def _legend(axes: Any, columns: int) -> None:
     """The names of the lines of ``axes``, above all panels."""
     axes.figure.legend(
@@ -708,7 +614,7 @@ def _over_time(found: Sequence[Measured], direct: float, axes: Any) -> None:
     axes.set(
         xlabel=f"{ERROR}: filled the largest, hollow of 99 %", ylabel="ns per point, one thread"
     )
-    _logarithmic(axes)
+    logarithmic(axes)
     axes.set_ylim(bottom=4.0)
     _legend(axes, 3)
 
@@ -722,7 +628,7 @@ def _over_size(found: Sequence[Measured], panels: Any) -> None:
             axes.plot(sizes, errors, mark + "-", color=color, label=label)
         axes.set_xlim(1e3, 2e7)
         axes.set(xlabel="bytes in memory", ylabel=rf"error of $\tilde\mu$, {title}")
-        _logarithmic(axes)
+        logarithmic(axes)
     _legend(panels[0], 3)
 
 
@@ -737,7 +643,7 @@ def _convergence(lines: dict[str, list[tuple[float, ...]]], panels: Any) -> None
             most = [point[4] for point in points]
             axes.plot(x, most, mark + ":", color=color, mfc="white", lw=1.0, zorder=1.5)
         axes.set(xlabel=cost, ylabel=r"error of $\tilde\mu$: filled the largest, hollow of 99 %")
-        _logarithmic(axes)
+        logarithmic(axes)
     _legend(panels[0], 3)
 
 
@@ -766,8 +672,6 @@ def small(points: int, rounds: int, quick: bool) -> str:  # noqa: ARG001
 
 def ball_speed_against_error(points: int, rounds: int, quick: bool) -> str:
     """A ball, of ball.py."""
-    from benchmarks import ball  # which takes its peers from here
-
     return ball.ball_speed_against_error(points // 5, rounds, quick)
 
 
