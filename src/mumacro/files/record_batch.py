@@ -17,7 +17,7 @@ from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, other_amplitude
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import ENDS, GAP, LIKE, SI, refusal
-from mumacro.inputs.headings import absent, absent_together, find_heads, meant_by
+from mumacro.inputs.headings import absent, find_heads, meant_by
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.inputs.layout import ColumnNames
 from mumacro.inputs.numbers import TOO_LARGE
@@ -239,8 +239,7 @@ def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
         yield f"there is no column y0, but {AMPLITUDE}: give --direction normal"
         inputs = [name for name in inputs if name != "y0"]
     if inputs:
-        one = len(inputs) == 1
-        yield absent(inputs[0], names) if one else absent_together(inputs, names)
+        yield absent(inputs, names)
     if "k" in inputs and not any(meant_by(column, loosely=False) == "k" for column in names):
         yield "rename the one that holds k, or give --rigid if all contacts are rigid"
 

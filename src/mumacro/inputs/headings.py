@@ -83,30 +83,25 @@ def meant_by(head: str, *, loosely: bool = True) -> str | None:
     return suggestion(name, loosely=loosely) or suggestion(first, loosely=False)
 
 
-def absent(name: str, heads: Sequence[str]) -> str:
-    """What to do about a column that is missing.
+def absent(names: Sequence[str], heads: Sequence[str]) -> str:
+    """Return what to do about columns that are missing.
 
-    >>> absent("v0", ["speed", "mu_macro"])
+    >>> absent(["v0"], ["speed", "mu_macro"])
     "there is no column v0; 'speed' is similar: rename that column to v0 [m/s] (or another unit in
     brackets)"
-    """
-    if alike := _similar(name, heads):
-        remedy = f"rename that column to {alike[1]} (or another unit in brackets)"
-        return f"there is no column {name}; {alike[0]!r} is similar: {remedy}"
-    return f"there is no column {_heading(name)}; there are {_listed(heads)}"
-
-
-def absent_together(names: Sequence[str], heads: Sequence[str]) -> str:
-    """What to do about several columns that are missing; what they share is told once.
-
-    >>> absent_together(["Fz", "v0"], ["speed", "note"])
+    >>> absent(["Fz", "v0"], ["speed", "note"])
     "there are no columns Fz [N], v0 [m/s]; there are 'speed', 'note'; similar: rename 'speed' to
     v0 [m/s]"
     """
-    headings = ", ".join(map(_heading, names))
-    renames = [f"{one[0]!r} to {one[1]}" for name in names if (one := _similar(name, heads))]
-    remedy = f"; similar: rename {', '.join(renames)}" if renames else ""
-    return f"there are no columns {headings}; there are {_listed(heads)}{remedy}"
+    alike = [one for name in names if (one := _similar(name, heads))]
+    if len(names) == 1 and alike:
+        head, column = alike[0]
+        remedy = f"rename that column to {column} (or another unit in brackets)"
+        return f"there is no column {names[0]}; {head!r} is similar: {remedy}"
+    what = "is no column" if len(names) == 1 else "are no columns"
+    renames = ", ".join(f"{head!r} to {column}" for head, column in alike)
+    remedy = f"; similar: rename {renames}" if alike else ""
+    return f"there {what} {', '.join(map(_heading, names))}; there are {_listed(heads)}{remedy}"
 
 
 def _listed(heads: Sequence[str]) -> str:

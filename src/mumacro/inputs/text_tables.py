@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from mumacro.inputs.decoding import LONGEST, Piece, Text, TextError, file_pieces
 from mumacro.inputs.fields import QUANTITY_OF, RIGID
-from mumacro.inputs.headings import absent, absent_together, find_heads, heading, unit_in_si
+from mumacro.inputs.headings import absent, find_heads, heading, unit_in_si
 from mumacro.inputs.layout import (
     BLANKS,
     END_OF_HEADER,
@@ -663,10 +663,7 @@ def read_table(
         group[0] for group in column_names.required_groups if not columns.keys() & set(group)
     ]
     if missing:
-        one = len(missing) == 1
-        faults.append(
-            absent(missing[0], layout.heads) if one else absent_together(missing, layout.heads)
-        )
+        faults.append(absent(missing, layout.heads))
     if faults:
         raise TextError.of([f"line {layout.head}: {fault}" for fault in faults])
     lines, rows, wrong = list[int](), list[list[str]](), list[tuple[int, str]]()

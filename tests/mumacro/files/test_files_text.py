@@ -2,9 +2,11 @@
 files of a folder are left out."""
 
 import csv
+import gzip
 import io
 import math
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -196,6 +198,77 @@ def test_what_is_refused_leaves_nothing(
     assert "Traceback" not in said
     assert len(said) < 2000
     assert [path.name for path in tmp_path.iterdir()] == ["cases.csv"]
+
+
+TABLE_BYTES = f"{HEAD},note\n{ROWS}".replace("01\n", "01,a\n").encode()
+MIB = 2**20
+#: files that are no tables, or damaged ones, and what is said of each
+HOSTILE: dict[str, tuple[Callable[[], bytes], str]] = {
+    "empty": (lambda: b"", "line 1: must name the columns, and is empty"),
+    "blank lines": (lambda: b"\n \r\n\t\n" * 5000, "line 1: must name the columns"),
+    "bytes": (lambda: bytes(range(256)) * 40, "byte 0x81 in line 3 is not"),
+    "a picture": (lambda: b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + bytes(90), "has a zero byte"),
+    "a line of 64 MiB": (lambda: TABLE_BYTES + b"1" * 64 * MIB, "line 4 has more than 16 MiB"),
+    "64 MiB of cells": (lambda: TABLE_BYTES + b"1," * 32 * MIB, "line 4 has more than 16 MiB"),
+    "an open quote": (
+        lambda: TABLE_BYTES + b'0.3,10,1e6,2e-6,2e4,0.01,"a\n' + TABLE_BYTES * 200_000,
+        "line 4: a quote is not closed",
+    ),
+    "cut in a quote": (
+        lambda: TABLE_BYTES + b'0.3,10,1e6,2e-6,2e4,0.01,"a',
+        "line 4: a quote is not closed",
+    ),
+    "a head of 100,000 other columns": (
+        lambda: ",".join(f"c{i}" for i in range(100_000)).encode(),
+        "line 1: there are no columns mu0",
+    ),
+    "a head of a million columns": (
+        lambda: TABLE_BYTES.replace(b"note", b"c," * 1_000_000),
+        "line 1: the column 'c' is there twice",
+    ),
+    "mixed encodings": (
+        lambda: TABLE_BYTES + "0.3,10,1e6,2e-6,2e4,0.01,µ\n".encode() + b"0.3,10,1,1,1,1,\xb5\n",
+        "byte 0xb5 in line 5 is not UTF-8",
+    ),
+    "mixed signs": (
+        lambda: TABLE_BYTES.replace(b",", b";") + b"0,3;10;1e6;2e-6;2e4;0,01;a\n",
+        "line 4: mu0 '0,3' a decimal comma",
+    ),
+    "two tables": (
+        lambda: TABLE_BYTES + TABLE_BYTES.replace(b"v0", b"v0 [mm/s]"),
+        "line 4 is another head",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_file_that_is_no_table_gets_one_line_and_leaves_nothing(
+    tmp_path: Path, capsys: Capture, name: str
+) -> None:
+    data, what = HOSTILE[name]
+    (tmp_path / "cases.csv").write_bytes(data())
+    assert main(["eval", str(tmp_path / "cases.csv"), "-o", str(tmp_path / "out.csv")]) == 1
+    (said,) = capsys.readouterr().err.splitlines()
+    assert said.startswith(f"mumacro eval: {tmp_path / 'cases.csv'}: ")
+    assert what in said
+    assert len(said) < 2000
+    assert [path.name for path in tmp_path.iterdir()] == ["cases.csv"]
+
+
+@pytest.mark.parametrize("end", ["csv", "parquet"])
+def test_a_file_that_is_cut_or_has_two_gigabytes_of_zeros_leaves_nothing(
+    tmp_path: Path, end: str
+) -> None:
+    packed = gzip.compress(TABLE_BYTES * 9)
+    (tmp_path / "cut.csv.gz").write_bytes(packed[: len(packed) // 2])
+    with pytest.raises(FilesError, match="the compressed file is damaged"):
+        evaluate_files([tmp_path / "cut.csv.gz"], tmp_path / f"out.{end}", TABLE)
+    with (tmp_path / "sparse.csv").open("wb") as stream:
+        stream.write(TABLE_BYTES)
+        stream.truncate(2 * 2**30)
+    with pytest.raises(FilesError, match="line 4 has a zero byte"):
+        evaluate_files([tmp_path / "sparse.csv"], tmp_path / f"out.{end}", TABLE)
+    assert {path.name for path in tmp_path.iterdir()} == {"cut.csv.gz", "sparse.csv"}
 
 
 def test_a_head_of_a_hundred_thousand_columns(tmp_path: Path, capsys: Capture) -> None:

@@ -584,7 +584,7 @@ def test_no_table_takes_longer_than_in_proportion_to_its_size(name: str) -> None
 def test_advice_to_rename_a_column_keeps_its_unit_and_halves_peak_to_peak(
     head: str, column: str
 ) -> None:
-    assert f"rename that column to {column} (or another unit" in absent("y0", [head])
+    assert f"rename that column to {column} (or another unit" in absent(["y0"], [head])
 
 
 @pytest.mark.parametrize(
