@@ -375,3 +375,12 @@ def test_a_null_is_refused_in_the_same_words_everywhere(
     for body in ([case], {**case, name: [None, 0.1]}):
         faults += client.post(BATCH, json=body).json()["errors"]
     assert {(fault["field"], fault["reason"]) for fault in faults} == words
+
+
+def test_of_many_bad_cases_all_are_counted_and_the_first_thousand_listed(
+    client: Any, case: Case
+) -> None:
+    two_slices = {**case, "v0": [-1.0] * 9000}
+    answer = client.post("/v1/mu-macro/batch", json=two_slices).json()
+    assert answer["n_errors"] == 9000
+    assert [error["index"] for error in answer["errors"]] == [*range(1000)]

@@ -1,0 +1,172 @@
+"""What a request holds until it is answered or its client has gone; headers that say two things."""
+
+import asyncio
+import json
+import time
+from collections.abc import Callable, Coroutine
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from starlette.types import Message, Receive, Scope, Send
+
+from service.admission import Admission, Admitted, Ticket
+from service.problems import FULL, RequestError
+from service.reading import read_body
+from service.security import HEALTH_PATHS
+from service.settings import Settings
+from tests.support.serving import CASE
+
+
+def run(main: Callable[[Admission], Coroutine[Any, Any, None]], **settings: Any) -> None:
+    """Run a coroutine with an admission of these settings."""
+
+    async def with_loop() -> None:
+        await main(Admission(Settings(**settings)))
+
+    asyncio.run(with_loop())
+
+
+def scope_of(admission: Admission) -> dict[str, Any]:
+    """What a request to an application with this admission has."""
+    app = SimpleNamespace(state=SimpleNamespace(admission=admission))
+    return {"type": "http", "path": "/v1/law", "app": app, "client": ("10.1.2.3", 1)}
+
+
+def test_a_request_that_goes_as_it_is_admitted_keeps_no_slot() -> None:
+    async def main(admission: Admission) -> None:
+        admission.see("a")
+        await admission.take("a", False)
+        waiting = asyncio.create_task(admission.take("b", False))
+        await asyncio.sleep(0)
+        admission.give_back("a", False)
+        assert admission.slots == 1
+        waiting.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await waiting
+        assert (admission.slots, admission.queue) == (0, [])
+
+    run(main, max_computations=1)
+
+
+def test_of_those_who_wait_the_client_with_the_fewest_slots_comes_first() -> None:
+    async def main(admission: Admission) -> None:
+        for client, slots in (("d", 4), ("a", 3), ("b", 1)):
+            admission.see(client)
+            for _ in range(slots):
+                await admission.take(client, False)
+        first, second = (asyncio.create_task(admission.take(x, False)) for x in "ab")
+        await asyncio.sleep(0)
+        admission.give_back("d", False)
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        assert (first.done(), second.done()) == (False, True)
+        first.cancel()
+        await asyncio.gather(first, return_exceptions=True)
+
+    run(main, max_computations=8)
+
+
+def test_a_body_that_grows_counts_once_and_a_refusal_is_counted() -> None:
+    async def main(admission: Admission) -> None:
+        ticket = Ticket(scope_of(admission))
+        ticket.weigh(800)
+        ticket.hold(800)
+        ticket.weigh(850)  # fifty bytes more
+        ticket.hold(850)
+        assert (admission.held_bytes, admission.refused) == (850, 0)
+        with pytest.raises(RequestError, match="one client may have 896 bytes"):
+            ticket.weigh(900)
+        assert admission.refused == 1
+        ticket.hold(0)
+        assert admission.held_bytes == 0
+
+    run(main, max_held_bytes=1024)
+
+
+def test_a_small_body_that_comes_in_pieces_is_held() -> None:
+    held: list[int] = []
+
+    async def main(admission: Admission) -> None:
+        pieces = iter([b"{" + b" " * 9, b" " * 10, b"}"])
+
+        async def receive() -> Message:
+            held.append(admission.held_bytes)
+            body = next(pieces)
+            return {"type": "http.request", "body": body, "more_body": not body.endswith(b"}")}
+
+        body = await read_body({}, receive, 1000, scope_of(admission))
+        assert json.loads(body) == {}
+
+    run(main)
+    assert held == [0, 10, 20]
+
+
+@pytest.mark.slow
+def test_the_time_limit_is_that_of_all_computations_of_a_request() -> None:
+    async def never() -> Message:
+        await asyncio.Event().wait()
+        raise AssertionError
+
+    async def main(admission: Admission) -> None:
+        ticket = Ticket(scope_of(admission))
+        await ticket.run(lambda: time.sleep(1.2), 1.0, never)
+        with pytest.raises(RequestError, match="up to 2 s"):
+            await ticket.run(lambda: time.sleep(1.2), 1.0, never)
+
+    run(main, compute_limit_s=2)
+
+
+@pytest.mark.parametrize("path", sorted(HEALTH_PATHS))
+def test_beyond_the_connections_only_the_probes_are_answered(path: str) -> None:
+    answered: list[str] = []
+
+    async def app(scope: Scope, _receive: Receive, _send: Send) -> None:
+        answered.append(scope["path"])
+
+    async def main(admission: Admission) -> None:
+        full = {**scope_of(admission), "state": {FULL: True}}
+        ends: Any = None
+        await Admitted(app)({**full, "path": path}, ends, ends)
+        with pytest.raises(RequestError, match="too many connections"):
+            await Admitted(app)(full, ends, ends)
+        await Admitted(app)({**full, "state": {}}, ends, ends)
+
+    run(main)
+    assert answered == [path, "/v1/law"]
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["x-api-key", "authorization", "content-type", "content-encoding", "x-request-id"],
+)
+def test_a_header_that_decides_something_is_given_once(
+    client: Any, problem: Callable[[Any, int], Any], name: str
+) -> None:
+    document = problem(client.get("/v1/tables", headers=[(name, "a"), (name, "a")]), 400)
+    assert document["detail"] == f"the header {name} is given more than once"
+
+
+@pytest.mark.parametrize(
+    ("path", "needs_key"),
+    [("/guide/", False), ("/guide/any.html", False), ("/guidebook", True), ("/guide-2/", True)],
+)
+def test_only_what_is_below_the_guide_is_open(started: Any, path: str, needs_key: bool) -> None:
+    with started(api_key="k" * 20) as client:
+        assert (client.get(path).status_code == 401) == needs_key
+
+
+@pytest.mark.parametrize(
+    ("number", "shown"),
+    [
+        (2**64 - 1, 2**64 - 1),
+        (2**64, "an integer of many digits"),
+        (-(2**63), -(2**63)),
+        (-(2**63) - 1, "an integer of many digits"),
+    ],
+)
+def test_a_refusal_shows_an_integer_as_long_as_json_has_it(
+    client: Any, problem: Callable[[Any, int], Any], number: int, shown: object
+) -> None:
+    document = problem(client.post("/v1/mu-macro", json={**CASE, "contact": number}), 422)
+    assert document["errors"][0]["value"] == shown
