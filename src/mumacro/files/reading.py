@@ -16,6 +16,7 @@ import pyarrow.csv
 import pyarrow.dataset
 
 from mumacro.files.record_batch import FilesError
+from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.decoding import TextError
 from mumacro.inputs.layout import GAPS, ColumnNames, Dialect, Layout
 from mumacro.inputs.signs import Signs
@@ -137,6 +138,9 @@ class ParquetSource:
         options = {"format": "parquet", "partitioning": hive, "partition_base_dir": folder}
         dataset = pa.dataset.dataset(names, **options)
         schemas = [part.physical_schema.remove_metadata() for part in dataset.get_fragments()]
+        for name, schema in zip(names[1:], schemas[1:], strict=True):
+            if units_of_fields(schema) != units_of_fields(schemas[0]):
+                raise FilesError(f"{name}: its fields have other units than those of {names[0]}")
         self.schema = pa.unify_schemas([dataset.schema, *schemas], promote_options="permissive")
         self.parts = list(pa.dataset.dataset(names, schema=self.schema, **options).get_fragments())
         self.where = f"{files[0]}: "

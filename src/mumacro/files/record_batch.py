@@ -5,7 +5,7 @@ Columns that are named like a missing input are refused.
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ import pyarrow.compute as pc
 
 from mumacro.answer import BAND, DEFAULT, TEXTS
 from mumacro.errors import InputError, MumacroError
+from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, other_amplitude
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import ENDS, GAP, LIKE, SI, refusal
@@ -23,7 +24,7 @@ from mumacro.inputs.layout import ColumnNames
 from mumacro.inputs.numbers import TOO_LARGE
 from mumacro.inputs.signs import Signs
 from mumacro.inputs.text_tables import numbers_of
-from mumacro.inputs.units import Scale, split_unit
+from mumacro.inputs.units import Scale, scale_of, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import chosen, names_in, paths_of
@@ -103,7 +104,8 @@ def answer(
     [{'row': 0, 'field': 'v0', 'value': '-1.0', 'reason': 'must be finite and >= 0'}]
     """
     kind = kind_in(batch, kind_of(contact, direction))
-    columns = find_columns(batch.schema.names, rigid, include, kind)
+    units = units_of_fields(batch.schema)
+    columns = find_columns(batch.schema.names, rigid, include, kind, units=units)
     result = answer_columns(batch, surrogate or Surrogate.open(), columns)
     schema = pa.schema([*batch.schema, *answer_fields(columns.answer_names)], batch.schema.metadata)
     answers = pa.RecordBatch.from_arrays([*batch.columns, *result.columns], schema=schema)
@@ -141,8 +143,10 @@ def find_columns(
     include: Sequence[str] = (),
     kind: Kind = SPRING,
     where: str = "",
+    units: Mapping[str, str] | None = None,
 ) -> Columns:
-    """What the columns of these names mean, and the names of those with answers.
+    """What the columns of these names mean, and the names of those with answers; ``units`` are
+    those that fields say, by column.
 
     FilesError names, after ``where``, all columns that stand twice in the heading, would be written
     twice, have an unknown unit, or are missing; for a missing one it lists the columns of the file,
@@ -153,7 +157,12 @@ def find_columns(
     """
     like = {name: LIKE.get(name, name) for name in (*ALL_FIELDS, "f", *ENDS)}
     like |= {column: LIKE.get(name, name) for column, name in DEVIATIONS.items()}
-    heads, faults = find_heads(names, like)
+    units = units or {}
+    heads, faults = find_heads([_with_unit(name, units.get(name)) for name in names], like)
+    for name, (i, scale) in heads.items():
+        unit = units.get(names[i])
+        if unit and scale_of(like[name], unit) not in (scale, None):
+            faults.append(f"the column {names[i]!r} has another unit in its field: {unit}")
     words = [name for name in KIND if name in names]
     all_names = {*heads, *words}
     other_names = dict.fromkeys(name for name in names if split_unit(name)[0] not in all_names)
@@ -190,6 +199,11 @@ def find_columns(
         raise FilesError(where + "; ".join(faults))
     headings = {name: (names[heads[name][0]], heads[name][1]) for name in like if name in heads}
     return Columns(headings, words, kind, tuple(include), answer_names)
+
+
+def _with_unit(name: str, unit: str | None) -> str:
+    """A head with the unit of its field, where it has none."""
+    return f"{name} [{unit}]" if unit and split_unit(name)[1] is None else name
 
 
 def kind_in(batch: pa.RecordBatch, kind: Kind, where: str = "") -> Kind:

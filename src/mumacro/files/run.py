@@ -22,6 +22,7 @@ from mumacro.files.record_batch import (
     names_of_columns,
 )
 from mumacro.files.writing import Output, csv_lines, written_as
+from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import KIND
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.kind import Kind, kind_of
@@ -151,7 +152,8 @@ class _Run:
         if words := [name for name in KIND if name in names]:
             first = next(self.source.blocks(0, words), None)
             kind = kind if first is None else kind_in(first.batch, kind, where)
-        self.columns = find_columns(names, rigid, include, kind, where)
+        units = units_of_fields(self.source.schema)
+        self.columns = find_columns(names, rigid, include, kind, where, units)
         headings = self.columns.headings
         sep, decimal = written_as(
             reading.ending_of(out), self.source.sep, self.source.decimal, dialect

@@ -60,6 +60,17 @@ def carried_unit(value: Any) -> Any:
     return None if isinstance(unit, str) and not unit.strip() else unit
 
 
+def units_of_fields(schema: Any) -> dict[str, str]:
+    """Return the units in the metadata of the fields of an Arrow schema, by column."""
+    units = {}
+    for field in schema:
+        metadata = field.metadata or {}
+        unit = metadata.get(b"units", metadata.get(b"unit", b"")).decode("utf-8", "replace")
+        if unit.strip():
+            units[field.name] = unit.strip()
+    return units
+
+
 def _unit_of_quantity(value: Any) -> Any:
     """The unit of a quantity of pint, astropy, unyt and others like them."""
     for attribute in ("units", "unit"):

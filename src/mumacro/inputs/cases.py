@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.carried import library, two_units
+from mumacro.inputs.carried import library, two_units, units_of_fields
 from mumacro.inputs.columns import (
     Column,
     Fault,
@@ -313,7 +313,7 @@ def _columns_in(
             if unit is not None and name in names and head not in names:
                 heads.setdefault(name, []).append((head, unit))
         columns = {}
-        of_fields = _units_of_fields(cases)
+        of_fields = units_of_fields(cases.schema) if library(cases) == "pyarrow" else {}
         for name, ((head, unit), *twice) in heads.items():
             if twice:
                 raise InputError(name, twice[0][0], "given once")
@@ -333,19 +333,6 @@ def _columns_in(
             "give anything else as {name: array}, a file as pandas.read_csv reads it, "
             "what is lazy after its collect() or read_all()",
         ) from error
-
-
-def _units_of_fields(table: Any) -> dict[str, str]:
-    """The units in the metadata of the fields of an Arrow table, by column."""
-    if library(table) != "pyarrow":
-        return {}
-    units = {}
-    for field in table.schema:
-        metadata = field.metadata or {}
-        unit = metadata.get(b"units", metadata.get(b"unit", b"")).decode("utf-8", "replace")
-        if unit.strip():
-            units[field.name] = unit
-    return units
 
 
 def library_of(value: Any) -> str:

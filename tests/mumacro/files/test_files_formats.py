@@ -429,3 +429,38 @@ def test_files_know_contact_and_ends_of_k(
         assert read_back == getattr(expected, column).tolist()
     for field, slope in expected.gradient.items():
         assert [float(row[f"gradient.{field}"]) for row in written] == slope.tolist()
+
+
+def said(inputs: Any, head: str, key: str, unit: str) -> Any:
+    """The same table, whose field of v0 has another head and says a unit."""
+    fields = [
+        field.with_name(head).with_metadata({key: unit}) if field.name == "v0" else field
+        for field in inputs.schema
+    ]
+    return pa.table(inputs.columns, schema=pa.schema(fields))
+
+
+@pytest.mark.parametrize("key", ["unit", "units"])
+def test_the_unit_of_a_field_of_parquet_is_that_of_its_column(
+    tmp_path: Path, capsys: Capture, key: str
+) -> None:
+    inputs = cases(20)
+    in_mm = inputs.set_column(5, "v0", pa.array(inputs["v0"].to_numpy() * 1e3))
+    right = TABLE.evaluate(inputs)["mu_macro"].to_numpy()
+    for head in ("v0", "v0 [mm/s]"):
+        source = write(said(in_mm, head, key, "mm s-1"), tmp_path / "said.parquet")
+        evaluate_files([source], tmp_path / "out.parquet", TABLE, force=True)
+        written = pq.read_table(tmp_path / "out.parquet")
+        np.testing.assert_allclose(written["mu_macro"].to_numpy(), right, rtol=1e-12)
+        assert written[head].to_pylist() == in_mm["v0"].to_pylist()
+    other = write(said(inputs, "v0", key, "m/s"), tmp_path / "other.parquet")
+    bad = write(said(inputs, "v0 [mm/s]", key, "m/s"), tmp_path / "bad.parquet")
+    mass = write(said(inputs, "v0", key, "kg"), tmp_path / "mass.parquet")
+    source = write(said(in_mm, "v0", key, "mm/s"), tmp_path / "said.parquet")
+    for files, words in (
+        ([bad], "has another unit in its field: m/s"),
+        ([mass], "'v0 [kg]' has a unit that v0 cannot have"),
+        ([source, other], "other units than those of"),
+    ):
+        message = ran(capsys, 1, *files, "-o", tmp_path / "no.csv")
+        assert words in message
