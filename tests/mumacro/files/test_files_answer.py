@@ -316,3 +316,16 @@ def test_a_column_without_numbers_is_refused_and_one_without_rows_answered(
     answers, rejects = answer(batch_of().slice(0, 0), surrogate)
     assert answers.num_rows == rejects.num_rows == 0
     assert tuple(answers.schema.names[6:]) == ANSWERS
+
+
+def test_a_double_that_is_too_large_in_si_is_rejected_and_no_rigid_contact(
+    surrogate: Surrogate,
+) -> None:
+    cases = {**CASE, "k": [1e301, 1e305]}
+    names = {"k": "k [N/um]"}
+    columns = {
+        names.get(name, name): value if name == "k" else [value] * 2
+        for name, value in cases.items()
+    }
+    _, rejects = answer(pa.RecordBatch.from_pydict(columns), surrogate)
+    assert [(one["row"], one["reason"]) for one in rejects.to_pylist()] == [(1, BEYOND)]
