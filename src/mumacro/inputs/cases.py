@@ -150,10 +150,15 @@ class Cases(NamedTuple):
         def cut(x: Any) -> Any:
             return x[which] if isinstance(x, np.ndarray) else x
 
-        size = len(range(*which.indices(self.size))) if isinstance(which, slice) else which.size
+        places = range(self.size)[which] if isinstance(which, slice) else which.tolist()
+        faults = {
+            name: {new: gaps[old] for new, old in enumerate(places) if old in gaps}
+            for name, gaps in self.faults.items()
+        }
         return self._replace(
             columns={name: cut(x) for name, x in self.columns.items()},
-            shape=(size,),
+            shape=(len(places),),
+            faults=faults,
             ends=self.ends and (self.ends[0][which], self.ends[1][which]),
             std={name: cut(x) for name, x in self.std.items()},
             f=cut(self.f),

@@ -48,16 +48,24 @@ def chosen(include: Iterable[str] | str, cases: Cases) -> tuple[Output, ...]:
 
     InputError for an unknown name, one that the cases lack, and std without a deviation.
     """
-    names = {*names_in(include)} if include else set()
+    names = frozenset(names_in(include)) if include else frozenset[str]()
     if not names and not cases.std:
         return ()
-    if "std" in names and not cases.std:
+    return _chosen(names, cases.kind, bool(cases.std), cases.ends is not None)
+
+
+@cache
+def _chosen(
+    names: frozenset[str], kind: Kind, deviations: bool, interval: bool
+) -> tuple[Output, ...]:
+    """The same, by what of the cases it depends on."""
+    if "std" in names and not deviations:
         bound = "without std where no input has a deviation: give one, such as std_k"
         raise InputError("include", "std", bound)
-    if cases.std:
-        names.add("std")
+    if deviations:
+        names |= {"std"}
     outputs = tuple(output for name, output in OUTPUTS.items() if name in names)
-    lacking = {*cases.kind.names.values()} | ({"interval"} if cases.ends is not None else set())
+    lacking = {*kind.names.values()} | ({"interval"} if interval else set())
     for output in outputs:
         for word in lacking & output.lacks.keys():
             bound = f"without {output.name} for {word}: {output.lacks[word]}"

@@ -22,21 +22,20 @@ def power(cases: Evaluated) -> Values:
     mu0, load, omega, v0 = (cases.columns[name] for name in ("mu0", "Fz", "omega", "v0"))
     v, y = (where(cases.usable, group, 1.0) for group in (cases.v_tilde, cases.y_tilde))
     number, bound = cases.quantity("power", v, y)
-    with np.errstate(all="ignore"):
-        force, rate = mu0 * load, cases.length_scale * omega
-        unit = where(cases.usable, force * rate, math.nan)
-        shaker, shaker_bound = (where(cases.moving, x * unit, 0.0) for x in (number, bound))
-        saved = (mu0 - cases.mu_macro) * load * v0
-        saved_bound = cases.error_bound * load * v0 + ROUNDING * abs(saved)
-        size: Any = abs(saved)
-        # of the drive; and of the shaker
-        driven = (mu0 > _LEAST) & ((cases.mu_macro == mu0) | (size > _LEAST)) & (size < _MOST)
-        plain = driven & (v < math.inf)
-        products: tuple[Any, ...] = mu0, force, cases.length_scale, rate, unit, shaker
-        for product in products:
-            plain = plain & (product > _LEAST) & (product < _MOST)
+    force, rate = mu0 * load, cases.length_scale * omega
+    unit = where(cases.usable, force * rate, math.nan)
+    shaker, shaker_bound = (where(cases.moving, x * unit, 0.0) for x in (number, bound))
+    saved = (mu0 - cases.mu_macro) * load * v0
+    saved_bound = cases.error_bound * load * v0 + ROUNDING * abs(saved)
+    size: Any = abs(saved)
+    # of the drive; and of the shaker
+    driven = (mu0 > _LEAST) & ((cases.mu_macro == mu0) | (size > _LEAST)) & (size < _MOST)
+    plain = driven & (v < math.inf)
+    products: tuple[Any, ...] = mu0, force, cases.length_scale, rate, unit, shaker
+    for product in products:
+        plain = plain & (product > _LEAST) & (product < _MOST)
     values = [shaker, saved, shaker_bound, saved_bound]
-    if not np.all(plain):
+    if not (plain.all() if isinstance(plain, np.ndarray) else plain):
         here = np.flatnonzero(~np.broadcast_to(plain, np.size(cases.mu_ratio)))
         for i, whole in enumerate(_at_the_ends(cases, here, v, y, number, bound)):
             column = np.array(np.broadcast_to(values[i], np.size(cases.mu_ratio)))
