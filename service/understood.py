@@ -6,9 +6,9 @@ from typing import Any
 
 from mumacro.contacts.geometries import ARGUMENTS
 from mumacro.errors import InputError
+from mumacro.inputs.case import read
 from mumacro.inputs.fields import INPUTS, QUANTITY_OF, RIGID
 from mumacro.inputs.oscillation import read_oscillation
-from mumacro.inputs.reading import read
 from mumacro.inputs.units import QUANTITIES
 from mumacro.motions.motion import PARTS
 

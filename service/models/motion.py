@@ -17,10 +17,10 @@ from pydantic import (
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from mumacro.errors import InputError
+from mumacro.inputs.case import read_one, reason_of
 from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF, described
 from mumacro.inputs.kind import ContactName
 from mumacro.inputs.oscillation import MOST_HARMONIC, WHOLE, read_oscillation
-from mumacro.inputs.reading import read_one, reason_of
 from mumacro.motions.motion import TOLERANCES
 
 from .answers import REMARKS, Number, Numbers, Remark, Understood, quantity, understood_inputs

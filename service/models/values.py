@@ -12,8 +12,8 @@ from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema, Wra
 from pydantic_core import PydanticCustomError
 
 from mumacro.errors import InputError
+from mumacro.inputs.case import read, reason_of
 from mumacro.inputs.fields import ENDS, MOST_HZ, QUANTITY_OF
-from mumacro.inputs.reading import read, reason_of
 from mumacro.inputs.units import QUANTITIES
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

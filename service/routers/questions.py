@@ -12,9 +12,9 @@ import mumacro
 from mumacro.answer import Answer, nested
 from mumacro.contacts.stiffening import Stiffening
 from mumacro.errors import InputError
+from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import Cases, ends_in, named
 from mumacro.inputs.fields import unit_of
-from mumacro.inputs.reading import read_one
 from mumacro.kernel.arrays import Array
 from mumacro.outputs import MEMBERS
 from mumacro.outputs.evaluation import chosen

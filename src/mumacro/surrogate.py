@@ -15,6 +15,7 @@ from mumacro import plotting
 from mumacro.answer import Answer
 from mumacro.errors import InputError, TableError
 from mumacro.frames import evaluate_labelled, frame_of_cases
+from mumacro.inputs.case import NUMBERS, read
 from mumacro.inputs.cases import (
     ABSENT,
     COLUMNS,
@@ -27,7 +28,6 @@ from mumacro.inputs.cases import (
 from mumacro.inputs.columns import is_column, read_column
 from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
 from mumacro.inputs.kind import BALL, SPRING, Kind, kind_of
-from mumacro.inputs.reading import NUMBERS, read
 from mumacro.inputs.signature import AnyCases, ManyCases, Numbers, OneCase, OneInterval
 from mumacro.kernel.arrays import Array, common_shape, flat
 from mumacro.kernel.threads import default_threads

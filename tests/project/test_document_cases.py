@@ -8,10 +8,10 @@ from urllib.parse import parse_qsl
 
 import numpy as np
 
+from mumacro.inputs.case import read
 from mumacro.inputs.doubts import UNITS, remarks
 from mumacro.inputs.fields import INPUTS
 from mumacro.inputs.oscillation import read_oscillation
-from mumacro.inputs.reading import read
 from tests.support.documents import PAGES
 from tests.support.places import ROOT
 

@@ -327,13 +327,13 @@ def predicted(case: Read) -> Any:
 
 
 def _si(name: str, value: Any) -> float:
-    from mumacro.inputs.reading import read_one
+    from mumacro.inputs.case import read_one
 
     return read_one(name, value)
 
 
 def _plain(case: Read) -> Read:
-    from mumacro.inputs.reading import read
+    from mumacro.inputs.case import read
 
     return {name: read(name, x).si for name, x in case.items()}
 

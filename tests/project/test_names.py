@@ -242,3 +242,15 @@ def test_an_option_that_is_not_there_is_found(tmp_path: Path, text: str, bad: st
     page = tmp_path / "page.md"
     page.write_text(text, "utf-8")
     assert missing_options(page) == {bad}
+
+
+# --- modules of the library -----------------------------------------------------------------------
+
+
+def test_no_two_modules_of_the_library_have_one_name() -> None:
+    """A command alone has the name of the module whose function it calls."""
+    library = ROOT / "src" / "mumacro"
+    modules = [path for path in library.rglob("*.py") if not path.stem.startswith("__")]
+    stems = [path.stem for path in modules if path.parent.name != "cli"]
+    assert len(stems) > 50
+    assert len({*stems}) == len(stems), sorted(stem for stem in stems if stems.count(stem) > 1)

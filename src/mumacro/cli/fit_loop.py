@@ -12,10 +12,10 @@ from mumacro.cli.common import ImpossibleError, OneLineParser, UsageError, as_js
 from mumacro.errors import InputError
 from mumacro.fits.loop import fit_loop
 from mumacro.fits.loop_fitted import LoopFit
+from mumacro.inputs.case import read_one
 from mumacro.inputs.decoding import TextError
 from mumacro.inputs.kind import CONTACTS
 from mumacro.inputs.layout import ColumnNames
-from mumacro.inputs.reading import read_one
 from mumacro.inputs.text_tables import read_table
 
 EXAMPLE = "mumacro fit-loop loop.csv Fz=10N --displacement x --force Ft -o loop.png"

@@ -15,8 +15,8 @@ from mumacro.cli.common import (
     open_table,
     read_case,
 )
+from mumacro.inputs.case import read_one
 from mumacro.inputs.fields import unit_of
-from mumacro.inputs.reading import read_one
 from mumacro.questions.law import law as friction_law
 from mumacro.results import known, tidy_zeros
 from mumacro.validity import load_rows

@@ -17,10 +17,10 @@ from mumacro.cli.common import (
     open_table,
     read_case,
 )
+from mumacro.inputs.case import read_one
 from mumacro.inputs.fields import ENDS, NAMES
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.names import suggestion
-from mumacro.inputs.reading import read_one
 from mumacro.motions.solve_motion import UNKNOWNS
 from mumacro.questions.solve_for import Root, TableSolution, solve_for
 from mumacro.results import tidy_zeros

@@ -7,9 +7,9 @@ from typing import Any
 
 from mumacro.cli import common
 from mumacro.cli.common import ImpossibleError, Unit, UsageError, as_json, in_columns, read_case
+from mumacro.inputs.case import read
 from mumacro.inputs.kind import kind_of
 from mumacro.inputs.oscillation import read_oscillation
-from mumacro.inputs.reading import read
 from mumacro.inputs.units import Scale, scale_in, suited
 from mumacro.motions.motion import PARTS
 from mumacro.motions.solve_motion import MotionSolution, solve_motion

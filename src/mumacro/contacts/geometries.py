@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from mumacro.errors import InputError
+from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import real
 from mumacro.inputs.doubts import UNITS, Remark
 from mumacro.inputs.names import unknown_name
-from mumacro.inputs.reading import read_one
 from mumacro.stiffness import (
     AXES,
     Contact,

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.units import QUANTITIES, Scale, bound_of_unit, is_level, scale_in, unit_in
+from mumacro.inputs.units import QUANTITIES, Scale, bound_of_unit, is_level, parse_unit, scale_in
 
 # of a unit that turns: without one of them 1/s is a frequency, with one of them it is none
 _ANGLES = ("rad", "deg", "°", "turn", "rev", "cycle", "rpm", "arc")
@@ -92,7 +92,7 @@ def without_carried_unit(name: str, value: Any, unit: Any, quantity: str) -> Pla
         if si is None:
             raise InputError(name, _shown(value, text), _bound(quantity, value, text))
         scale, value = Scale(), si
-    return Plain(_numbers(value), scale, unit_in(quantity, text))
+    return Plain(_numbers(value), scale, parse_unit(quantity, text))
 
 
 def scale_of_carried(name: str, unit: Any, quantity: str) -> Scale:

@@ -15,6 +15,7 @@ import numpy as np
 
 from mumacro.errors import InputError
 from mumacro.inputs.carried import library, two_units, units_of_fields
+from mumacro.inputs.case import NO_DEVIATION, NUMBERS, Value, read
 from mumacro.inputs.columns import (
     Column,
     Fault,
@@ -47,7 +48,6 @@ from mumacro.inputs.kind import (
 )
 from mumacro.inputs.names import in_place_of, suggestion
 from mumacro.inputs.numbers import check_signs
-from mumacro.inputs.reading import NO_DEVIATION, NUMBERS, Value, read
 from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Places, common_shape, flat
 

@@ -22,8 +22,7 @@ from mumacro.inputs.carried import (
     without_carried_unit,
     without_mask,
 )
-from mumacro.inputs.fields import GAP, QUANTITY_OF, is_rigid
-from mumacro.inputs.reading import (
+from mumacro.inputs.case import (
     A_NUMBER,
     NO_DEVIATION,
     NUMBERS,
@@ -34,6 +33,7 @@ from mumacro.inputs.reading import (
     other_number,
     read,
 )
+from mumacro.inputs.fields import GAP, QUANTITY_OF, is_rigid
 from mumacro.inputs.units import QUANTITIES, scale_in
 from mumacro.kernel.arrays import Array
 

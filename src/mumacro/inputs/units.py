@@ -397,19 +397,21 @@ def scale_in(quantity: str, unit: str) -> Scale | None:
     scale = units.get(unit)
     if scale is not None or len(unit) > LONGEST:
         return scale
-    return units.get(unit_in(quantity, unit))
+    return units.get(parse_unit(quantity, unit))
 
 
 # an amplitude as vibrations are measured: from zero to the peak
 _PEAK = re.compile(r"(.*?\w) ?(?:0-?|zero[ -]to[ -])?(?:peak|pk|(?<=0)-?p)", re.IGNORECASE)
 
 
-def unit_in(quantity: str, unit: str) -> str:
-    """A unit of a quantity as the table writes it; that of a length may say that the value is an
-    amplitude.
+def parse_unit(quantity: str, unit: str) -> str:
+    """Return a unit of a quantity as the table writes it; that of a length may say that the value
+    is an amplitude.
 
-    >>> unit_in("length", "um 0-pk"), unit_in("length", "umpp"), unit_in("speed", "mm sec^-1")
-    ('um', 'umpp', 'mm/s')
+    >>> parse_unit("length", "um 0-pk"), parse_unit("length", "umpp")
+    ('um', 'umpp')
+    >>> parse_unit("speed", "mm sec^-1")
+    'mm/s'
     """
     if quantity == "length" and (match := _PEAK.fullmatch(unit.strip(" []()"))) is not None:
         of_length = canonical(match[1])

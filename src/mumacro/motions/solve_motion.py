@@ -13,12 +13,12 @@ import numpy as np
 
 from mumacro import plotting
 from mumacro.errors import InputError
+from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import real
 from mumacro.inputs.columns import to_si
 from mumacro.inputs.fields import RAD_PER_CYCLE, unit_of
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.oscillation import read_oscillation
-from mumacro.inputs.reading import read_one
 from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array
 from mumacro.motions.motion import PARTS, motion

@@ -12,11 +12,11 @@ from mumacro import plotting
 from mumacro.answer import BAND, Answer
 from mumacro.contacts.stiffening import Stiffening, stiffening_of
 from mumacro.errors import InputError
+from mumacro.inputs.case import read, read_one
 from mumacro.inputs.cases import DEVIATIONS, Cases, fixed_inputs, named, without_interval
 from mumacro.inputs.columns import is_column, to_si
 from mumacro.inputs.fields import ENDS, NAMES, POSITIVE, QUANTITY_OF, field_of, unit_of
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
-from mumacro.inputs.reading import read, read_one
 from mumacro.kernel.arrays import Array
 from mumacro.outputs.evaluation import chosen
 from mumacro.questions.borders import Crossing, border_crossings

@@ -17,9 +17,9 @@ import pytest
 from mumacro import InputError, Surrogate, fit
 from mumacro.cli.main import COMMANDS, main
 from mumacro.contacts.geometries import GEOMETRIES, contact_of
+from mumacro.inputs.case import read_one
 from mumacro.inputs.fields import ENDS, NAMES, SI
 from mumacro.inputs.names import suggestion
-from mumacro.inputs.reading import read_one
 from mumacro.inputs.units import UNITS_OF, scale_of, split_unit
 from mumacro.validity import model_rows
 from tests.support.cases import Capture, Case

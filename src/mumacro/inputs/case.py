@@ -22,8 +22,8 @@ from mumacro.inputs.units import (
     Scale,
     bound_of_unit,
     canonical,
+    parse_unit,
     scale_in,
-    unit_in,
 )
 
 #: types of one real number; a truth value is none
@@ -235,7 +235,7 @@ def _of_text(name: str, quantity: str, raw: str) -> Value:
             raise
         raise InputError(name, raw, _of_no_number(quantity, str(error))) from None
     scale = _scale_or_refuse(name, quantity, raw, number, unit)
-    return Value(scale.si(number), text=raw, unit=unit_in(quantity, unit) if unit else None)
+    return Value(scale.si(number), text=raw, unit=parse_unit(quantity, unit) if unit else None)
 
 
 def _of_no_number(quantity: str, reason: str) -> str:
@@ -289,7 +289,7 @@ def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) ->
         in_percent = f"({number:.12g} ± {deviation:.12g}) %"
         bound = f"clear: it may be {in_percent}; write that, or the deviation without %"
         raise InputError(name, raw, bound)
-    own_unit = unit_in(quantity, unit if relative else unit or behind) or None
+    own_unit = parse_unit(quantity, unit if relative else unit or behind) or None
     if relative:
         value = _scale_or_refuse(name, quantity, raw, number, unit).si(number)
         return Value(value, abs(value) * deviation / 100.0, text=raw, unit=own_unit)
@@ -312,4 +312,4 @@ def _interval(name: str, quantity: str, raw: str, text: str) -> Value:
     if not 0.0 < ends[0] <= ends[1] < math.inf:
         raise InputError(name, raw, _INTERVAL)
     middle = min(max(math.sqrt(ends[0]) * math.sqrt(ends[1]), ends[0]), ends[1])
-    return Value(middle, None, *ends, raw, unit_in(quantity, behind or unit) or None)
+    return Value(middle, None, *ends, raw, parse_unit(quantity, behind or unit) or None)

@@ -12,11 +12,11 @@ import pandas as pd
 import pytest
 
 from mumacro import InputError
+from mumacro.inputs.case import read
 from mumacro.inputs.doubts import remarks
 from mumacro.inputs.fields import INPUTS
 from mumacro.inputs.numbers import read_number
 from mumacro.inputs.oscillation import read_oscillation
-from mumacro.inputs.reading import read
 from mumacro.inputs.units import QUANTITIES, canonical, scale_in
 from tests.support.comparing import close
 
