@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.fits.fitted import Fit, quantile
+from mumacro.fits.fitted import Fit
 from mumacro.fits.measured_points import STD, Measured
-from mumacro.fits.profile import Goal, Profile
+from mumacro.fits.profile import Profile, quantile
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 from mumacro.validity import HARDLY
@@ -274,40 +274,13 @@ class _Problem(Measured):
         return self._allowed_ranges(profile)
 
     def _allowed_ranges(self, profile: Profile) -> dict[str, tuple[float, float]]:
-        """Smallest and largest value of each unknown among the contacts that are allowed.
-
-        Where the first or last place is allowed there is no bound on that side: k is 0 or infinite.
-        """
-        at, inside = profile.at, profile.at.chi2 <= profile.limit
-        finite = np.isfinite(at.s)
-        low = dict.fromkeys(self.unknowns, math.inf)
-        high = dict.fromkeys(self.unknowns, 0.0)
-        if inside[finite].any():
-            ends = profile.ends([goal for name in self.unknowns for goal in self._goals(name)])
-            for i, name in enumerate(self.unknowns):
-                low[name], high[name] = max(-ends[2 * i], 0.0), ends[2 * i + 1]
-        along = self.unknowns[0]
-        if inside[0]:
-            low[along] = 0.0
-        if inside[-1]:
-            high[along] = math.inf
-            low[along] = min(low[along], float(np.exp(at.s[finite][-1]) * at.factor[-1]))
-        if inside[-1] and len(self.unknowns) == 2:  # mu0 of the rigid contact
-            half_width = math.sqrt((profile.limit - at.chi2[-1]) / at.rise[-1])
-            low["mu0"] = min(low["mu0"], max(float(at.factor[-1]) - half_width, 0.0))
-            high["mu0"] = max(high["mu0"], float(at.factor[-1]) + half_width)
-        return {name: (low[name], high[name]) for name in self.unknowns}
-
-    def _goals(self, name: str) -> tuple[Goal, Goal]:
-        """The least and the largest value of an unknown at places of the profile."""
-        if len(self.unknowns) == 1:
-            return lambda s, _, __: -np.exp(s), lambda s, _, __: np.exp(s)
-        if name == "mu0":
-            return lambda _, mu0, off: off - mu0, lambda _, mu0, off: mu0 + off
-        return (
-            lambda s, mu0, off: np.exp(s) * np.minimum(off - mu0, 0.0),
-            lambda s, mu0, off: np.exp(s) * (mu0 + off),
-        )
+        """Return the smallest and the largest value of each unknown among the contacts that are
+        allowed; where the softest is, k has no lower bound."""
+        ranges = dict(zip(self.unknowns, profile.ranges(), strict=True))
+        if profile.at.chi2[0] <= profile.limit:
+            along = self.unknowns[0]
+            ranges[along] = 0.0, ranges[along][1]
+        return ranges
 
     def _warnings(
         self,

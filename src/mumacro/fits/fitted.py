@@ -8,14 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mumacro import plotting
-from mumacro.errors import missing
 from mumacro.fits.measured_points import STD, UNKNOWNS, Measured
+from mumacro.fits.profile import quantile
 from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import RIGID
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.results import Result, Rows
 
-CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept
 _CURVE = 200  # points of the fitted law
 
 
@@ -305,14 +304,3 @@ def _worded(part: Any, name: str = "") -> Any:
     if isinstance(part, (list, tuple)):
         return [_worded(entry, name) for entry in part]
     return RIGID if name == "k" and part == math.inf else part
-
-
-def quantile(dof: int | None) -> float:
-    """Half width of a 95 % interval in standard deviations: of Student's t, or of the normal
-    distribution."""
-    try:
-        from scipy.special import ndtri, stdtrit
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(missing("fit", error), name=error.name) from None
-    share = 0.5 + 0.5 * CONFIDENCE
-    return float(ndtri(share) if dof is None or dof < 1 else stdtrit(dof, share))

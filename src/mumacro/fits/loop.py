@@ -14,9 +14,8 @@ import numpy as np
 
 from mumacro.errors import InputError
 from mumacro.fits.cycles import cycles_of
-from mumacro.fits.fitted import quantile
 from mumacro.fits.loop_fitted import LoopFit
-from mumacro.fits.profile import Profile
+from mumacro.fits.profile import Profile, quantile
 from mumacro.inputs.cases import real
 from mumacro.inputs.columns import to_si
 from mumacro.inputs.kind import kind_of
@@ -384,32 +383,12 @@ class _Loop:
         return self._by_profile(profile) | self._linear_by_profile(profile, around)
 
     def _by_profile(self, profile: Profile) -> dict[str, tuple[float, float]]:
-        """Smallest and largest k and mu0 among the contacts that are allowed."""
-        at, limit = profile.at, profile.limit
-        inside = at.chi2 <= limit
-        low, high = {"k": math.inf, "mu0": math.inf}, {"k": 0.0, "mu0": 0.0}
-        if inside[np.isfinite(at.s)].any():
-            ends = profile.ends(
-                [
-                    lambda s, mu0, off: np.exp(s) * np.minimum(off - mu0, 0.0),
-                    lambda s, mu0, off: np.exp(s) * (mu0 + off),
-                    lambda _, mu0, off: off - mu0,
-                    lambda _, mu0, off: mu0 + off,
-                ]
-            )
-            low = {"k": max(-ends[0], 0.0), "mu0": max(-ends[2], 0.0)}
-            high = {"k": ends[1], "mu0": ends[3]}
-        if inside[0]:
-            high["mu0"] = math.inf
-        if inside[-1]:
-            half = math.sqrt((limit - at.chi2[-1]) / at.rise[-1])
-            last = float(np.exp(at.s[-2]) * at.factor[-1])
-            low = {
-                "k": min(low["k"], last),
-                "mu0": min(low["mu0"], max(float(at.factor[-1]) - half, 0.0)),
-            }
-            high = {"k": math.inf, "mu0": max(high["mu0"], float(at.factor[-1]) + half)}
-        return {name: (low[name], high[name]) for name in low}
+        """Return the smallest and the largest k and mu0 among the contacts that are allowed; where
+        a line is, the loop need not slip, and mu0 has no upper bound."""
+        ranges = dict(zip(("k", "mu0"), profile.ranges(), strict=True))
+        if profile.at.chi2[0] <= profile.limit:
+            ranges["mu0"] = ranges["mu0"][0], math.inf
+        return ranges
 
     def _linear_by_profile(
         self, profile: Profile, around: dict[str, tuple[float, float]]

@@ -13,13 +13,16 @@ A valley is found however narrow it is, as long as the slopes at the samples on 
 turn.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from mumacro.errors import missing
 from mumacro.kernel.arrays import Array, Bools, Places
 
+CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept
 _ROUNDS = 40
 _NARROWEST = 1e-6  # in s: a shorter chord is not halved
 # as shares of the rise of chi2 that is allowed: a dip that counts as no minimum, and what the error
@@ -36,6 +39,16 @@ _INSIDE = 32  # places, at least, in the ranges that are allowed
 Model = Callable[[Array, bool], tuple[Array, Array]]
 #: places, factors and half widths of the factors (m,) -> what is to be as large as possible (m,)
 Goal = Callable[[Array, Array, Array], Array]
+
+
+# the least, with its sign turned, and the largest value
+_ALONE: tuple[Goal, ...] = (lambda s, _, __: -np.exp(s), lambda s, _, __: np.exp(s))
+_WITH_FACTOR: tuple[Goal, ...] = (
+    lambda s, factor, off: np.exp(s) * np.minimum(off - factor, 0.0),
+    lambda s, factor, off: np.exp(s) * (factor + off),
+    lambda _, factor, off: off - factor,
+    lambda _, factor, off: factor + off,
+)
 
 
 def _dots(a: Array, b: Array) -> Array:
@@ -224,8 +237,30 @@ class Profile:
 
     # --- ranges -----------------------------------------------------------------------------------
 
-    def ends(self, goals: Sequence[Goal]) -> list[float]:
-        """The largest value of each goal over all contacts that are allowed, at finite places."""
+    def ranges(self) -> list[tuple[float, float]]:
+        """Return the smallest and the largest value among the contacts that are allowed: of e^s, or
+        where there is a factor of e^s times the factor, and of the factor.
+
+        Where the last place, of infinite s, is allowed the first has no upper bound.
+        """
+        at, inside = self.at, self.at.chi2 <= self.limit
+        finite = np.isfinite(at.s)
+        goals = _WITH_FACTOR if self._has_factor else _ALONE
+        low, high = [math.inf] * (len(goals) // 2), [0.0] * (len(goals) // 2)
+        if inside[finite].any():
+            ends = self._ends(goals)
+            low, high = [max(-end, 0.0) for end in ends[::2]], ends[1::2]
+        if inside[-1]:
+            low[0] = min(low[0], float(np.exp(at.s[finite][-1]) * at.factor[-1]))
+            high[0] = math.inf
+        if inside[-1] and self._has_factor:
+            half = math.sqrt((self.limit - at.chi2[-1]) / at.rise[-1])
+            low[1] = min(low[1], max(float(at.factor[-1]) - half, 0.0))
+            high[1] = max(high[1], float(at.factor[-1]) + half)
+        return [*zip(low, high, strict=True)]
+
+    def _ends(self, goals: Sequence[Goal]) -> list[float]:
+        """Return the largest value of each goal over the contacts that are allowed, of finite s."""
         inside = self.at.chi2 <= self.limit
         s = self._allowed_places(inside)
         at = self.samples(s, slopes=False)
@@ -260,3 +295,14 @@ class Profile:
         parts = 1 + _INSIDE // max(s.size, 1)
         between = np.linspace(s[:-1], s[1:], parts, endpoint=False).ravel()
         return np.unique(np.concatenate([s, between]))
+
+
+def quantile(dof: int | None) -> float:
+    """Half width of a 95 % interval in standard deviations: of Student's t, or of the normal
+    distribution."""
+    try:
+        from scipy.special import ndtri, stdtrit
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(missing("fit", error), name=error.name) from None
+    share = 0.5 + 0.5 * CONFIDENCE
+    return float(ndtri(share) if dof is None or dof < 1 else stdtrit(dof, share))

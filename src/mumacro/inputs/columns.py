@@ -152,7 +152,10 @@ def to_si(name: str, value: Any, quantity: str = "") -> Any:
 def refuse_gaps(name: str, column: Column) -> None:
     """Raise InputError for the first gap of a column, with its place."""
     for place, fault in column.faults.items():
-        bound = fault.reason.removeprefix("must be ")
+        gap = fault.reason.startswith("is missing")
+        bound = (
+            f"a real number: it {fault.reason}" if gap else fault.reason.removeprefix("must be ")
+        )
         raise InputError(name, fault.entry, bound, place)
 
 
