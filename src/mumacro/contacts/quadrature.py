@@ -10,6 +10,8 @@ from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import Data
 
 DRIVEN_NODES = 28
+#: of the null rules, in bands that are six apart
+DEGREES = np.array([13, 14, 15, 19, 20, 21, 25, 26, 27])
 
 
 def piece_rule(nodes: int) -> Array:
@@ -29,16 +31,15 @@ def piece_rule(nodes: int) -> Array:
 
 
 def driven_rule() -> Array:
-    """The rule of oscillation along, (nodes, 5): as :func:`piece_rule`, and three null rules on the
-    same nodes.
+    """Return the rule of oscillation along, (nodes, 11): :func:`piece_rule`, and nine null rules on
+    the same nodes.
 
-    A null rule gives the coefficient of one Legendre polynomial in the integrand, of degree nodes -
-    3 to nodes - 1 (Laurie; Berntsen and Espelid): what the rule integrates exactly, and the last
-    that it can tell apart.
+    A null rule gives the coefficient of one Legendre polynomial in the integrand (Laurie; Berntsen
+    and Espelid).  They stand in three bands of :data:`DEGREES`: the last has the highest degrees
+    that the nodes can tell apart, and the others show how the coefficients fall.
     """
     x, _ = np.polynomial.legendre.leggauss(DRIVEN_NODES)
-    degrees = np.arange(DRIVEN_NODES - 3, DRIVEN_NODES)
-    nulls = np.polynomial.legendre.legvander(x, DRIVEN_NODES)[:, degrees] * (2 * degrees + 1)
+    nulls = np.polynomial.legendre.legvander(x, DRIVEN_NODES)[:, DEGREES] * (2 * DEGREES + 1)
     return np.ascontiguousarray(np.concatenate([piece_rule(DRIVEN_NODES), nulls], axis=1))
 
 

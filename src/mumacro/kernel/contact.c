@@ -8,8 +8,15 @@
  * infinity.  Across, a table holds that (atlas.c).  Along, it is an integral
  * over closed forms, taken here. */
 
-#define MU_DRIVEN_COLUMNS 5 /* of a node of the rule of oscillation along */
-#define MU_HUGE 1e280       /* groups beyond which all springs are as the middle one to rounding */
+/* null rules of the rule of oscillation along, in three bands of degrees, and the columns of a node
+ */
+enum {
+    MU_BANDS = 3,
+    MU_OF_BAND = 3,
+    MU_NULLS = MU_BANDS * MU_OF_BAND,
+    MU_DRIVEN_COLUMNS = 2 + MU_NULLS
+};
+#define MU_HUGE 1e280 /* groups beyond which all springs are as the middle one to rounding */
 
 /* 1 - xi of the spring with the load s. */
 MU_INLINE double mu_outside(double s) { return s < 1.0 ? s / (1.0 + sqrt(1.0 - s)) : 1.0; }
@@ -130,10 +137,42 @@ static mu_driven mu_drive_spring(int direction, double v, double y) {
 
 /* The rows that a ball sums over its springs. */
 enum { MU_SUM_MU, MU_SUM_V, MU_SUM_Y, MU_SUM_STICK, MU_SUMS };
-/* A rule of n nodes misses what Legendre polynomials of degree 2n and more carry.  The
- * three highest that it can tell apart, of degree n - 3 to n - 1, carry more: the largest
- * of them, times this, is the bound. */
+/* A rule of n nodes misses what Legendre polynomials of degree 2n and more carry.  The three
+ * highest that it can tell apart, of degree n - 3 to n - 1, carry more: the largest of them, times
+ * this, is the bound. */
 #define MU_NULL_SAFETY 16.0
+/* The coefficients of an integrand without a singularity near the nodes fall with the degree d, by
+ * r from one band to the next.  Where they fall like rho^-d, r = rho^-6, the rule misses 2 r^(29/6)
+ * / (1 - r^(1/6)) times the largest of the last band; where they fall like d^-p, r = (20/26)^p, it
+ * is 112/(p - 1) (26/56)^p.  Up to this r, of p = 4, both are less than MU_NULL_SAFETY r^2. */
+#define MU_NULL_FALL 0.35
+/* The singularities near the nodes, which the rule may step over, are two: at the load `last` = 1
+ * the first spring slips backwards, by the root of the distance to it; and at slow speed the last
+ * spring without reverse slip has a layer.  Away from both the coefficients fall. */
+#define MU_NULL_BELOW 0.8
+#define MU_NULL_ABOVE 2.0
+#define MU_NULL_SLOW 0.02
+/* of their sum, the errors of the weights of the rule (tests), at an integrand of thrice its mean
+ */
+#define MU_RULE_ROUNDING 5e-15
+
+/* What the rule misses of a sum over springs, from the coefficients of its integrand. */
+static double mu_missed(const double nulls[MU_NULLS], double sum, int falls) {
+    /* rounding of a coefficient of the degree 27 */
+    const double noise = 55.0 * MU_LINE_ROUNDING * fabs(sum);
+    double largest[MU_BANDS] = {0.0}, r = 0.0;
+    for (int i = 0; i < MU_NULLS; ++i) {
+        double *of_band = &largest[i / MU_OF_BAND];
+        *of_band = mu_max(*of_band, fabs(nulls[i]));
+    }
+    for (int band = 1; band < MU_BANDS; ++band) /* one that is noise does not fall any more */
+        if (band == 1 || largest[band - 1] > noise)
+            r = mu_max(r, largest[band] < MU_NULL_FALL * largest[band - 1]
+                              ? largest[band] / largest[band - 1]
+                              : 1.0);
+    return MU_NULL_SAFETY * largest[MU_BANDS - 1] * (falls ? r * r : 1.0) +
+           MU_RULE_ROUNDING * fabs(sum);
+}
 
 /* What a ball's springs are driven by. */
 enum { MU_NODE_V, MU_NODE_Y, MU_NODE_SHARE, MU_NODE_ROWS };
@@ -185,7 +224,8 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
     const double still = 1.0 - reversed;
     const double load = MU_MIDDLE * still * (1.0 - still * still / 3.0);
     const double ill = 1.0 + 2.0 * at.x * y / (y - v);
-    double nulls[MU_SUMS][3] = {{0.0}}, sums[2 * MU_SUMS] = {0.0};
+    const int falls = last > MU_NULL_ABOVE || (last < MU_NULL_BELOW && at.x > MU_NULL_SLOW);
+    double nulls[MU_SUMS][MU_NULLS] = {{0.0}}, sums[2 * MU_SUMS] = {0.0};
     const mu_stuck stuck = mu_half_stick(&at);
     mu_driven out = {mu_line_of_stick(v, y, stuck.h, MU_ALONG_REVERSES), 0.0, 0.0, 0.0, 0.0, 0.0};
     mu_line *sum = &out.line;
@@ -211,7 +251,7 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
             const double *point = rule->points + MU_DRIVEN_COLUMNS * (i + lane);
             for (int row = 0; row < 2 * MU_SUMS; ++row) sums[row] += rows[row][lane];
             for (int row = 0; row < MU_SUMS; ++row)
-                for (int j = 0; j < 3; ++j) nulls[row][j] += point[2 + j] * rows[row][lane];
+                for (int j = 0; j < MU_NULLS; ++j) nulls[row][j] += point[2 + j] * rows[row][lane];
         }
     }
     sum->mu += sums[MU_SUM_MU];
@@ -222,17 +262,10 @@ static mu_driven mu_drive_ball(const mumacro_data *data, double v, double y) {
     out.bound_v += sums[MU_SUMS + MU_SUM_V];
     out.bound_y += sums[MU_SUMS + MU_SUM_Y];
     out.stick_bound += sums[MU_SUMS + MU_SUM_STICK];
-    {
-        double missed[MU_SUMS];
-        for (int row = 0; row < MU_SUMS; ++row) {
-            const double *of = nulls[row];
-            missed[row] = MU_NULL_SAFETY * mu_max(fabs(of[0]), mu_max(fabs(of[1]), fabs(of[2])));
-        }
-        out.bound += missed[MU_SUM_MU];
-        out.bound_v += missed[MU_SUM_V];
-        out.bound_y += missed[MU_SUM_Y];
-        out.stick_bound += missed[MU_SUM_STICK];
-    }
+    out.bound += mu_missed(nulls[MU_SUM_MU], sums[MU_SUM_MU], falls);
+    out.bound_v += mu_missed(nulls[MU_SUM_V], sums[MU_SUM_V], falls);
+    out.bound_y += mu_missed(nulls[MU_SUM_Y], sums[MU_SUM_Y], falls);
+    out.stick_bound += mu_missed(nulls[MU_SUM_STICK], sums[MU_SUM_STICK], falls);
     /* a spring at the edge may belong to the others: slopes jump */
     if (last < 1.0 + 4.0 * MU_LINE_ROUNDING * ill) {
         const double room = mu_max(1.0 - last, MU_LINE_ROUNDING * ill);

@@ -14,8 +14,9 @@ typedef struct {
 } mumacro_cells;
 
 /* Quadrature over the springs of a ball that slip backwards, under oscillation along the sliding
- * direction: points (nodes, 5), the share of the radius beyond a node, its weight, and then three
- * null rules, which are the coefficients of the integrand's three highest Legendre polynomials. */
+ * direction: points (nodes, 11), the share of the radius beyond a node, its weight, and then null
+ * rules, which are coefficients of the integrand by Legendre polynomials: three bands of three
+ * degrees, the last of them the highest that the nodes can tell apart. */
 typedef struct {
     int64_t nodes;
     const double *points;

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate
+from mumacro.contacts.quadrature import DRIVEN_NODES, piece_rule
 from tests.support import extended
 from tests.support.cases import Array, opened, tables
 from tests.support.driven import answered, hard, ordinary
@@ -20,8 +21,19 @@ needs_digits = pytest.mark.skipif(
     not extended.HAS_EXTENDED, reason="numpy.longdouble has the digits of a double here"
 )
 
+
+def legendre(x: Array) -> tuple[Array, Array]:
+    """Return the polynomial of Legendre of the degree DRIVEN_NODES, and its slope."""
+    before, value = np.ones_like(x), x
+    for k in range(2, DRIVEN_NODES + 1):
+        before, value = value, ((2 * k - 1) * x * value - (k - 1) * before) / k
+    return value, DRIVEN_NODES * (x * value - before) / (x * x - 1.0)
+
+
 #: largest median of bound over error, by row of extended.ROWS
 WIDEST = (400.0, 400.0, 1000.0, 3000.0, 3000.0)
+#: of a ball along, whose springs slip backwards with y~ below 10: where the rule has much to miss
+WIDEST_OF_RULE = (100.0, 100.0, 300.0, 400.0, 600.0)
 
 
 def check(
@@ -62,6 +74,34 @@ def test_the_bounds_of_a_ball_along_hold_and_are_not_wide(table: Surrogate) -> N
     assert np.all(check(table, v, y, "ball", "along", extended.ball(v, y, 40)) < WIDEST)
     v, y = hard(60, 6)
     check(table, v, y, "ball", "along", extended.ball(v, y, 40))
+
+
+@needs_digits
+@pytest.mark.slow
+def test_the_bounds_of_the_rule_hold_where_coefficients_are_trusted_to_fall(
+    table: Surrogate,
+) -> None:
+    """Both sides of the lines between which ``mu_missed`` reads the fall of the coefficients."""
+    rng = np.random.default_rng(9)
+    fast, x = 10.0 ** rng.uniform(-1.7, -0.001, 300), 10.0 ** rng.uniform(-10.0, -0.01, 300)
+    x = np.concatenate([fast, x])
+    last = np.concatenate([rng.uniform(0.3, 0.82, 300), rng.uniform(1.9, 6.0, 300)])
+    y = 1.5 * last / (np.sqrt((1.0 - x) * (1.0 + x)) - x * np.arccos(x))
+    widths = check(table, x * y, y, "ball", "along", extended.ball(x * y, y, 48))
+    assert np.all(widths < WIDEST_OF_RULE)
+
+
+def test_the_weights_of_the_rule_are_right_to_their_bound() -> None:
+    """``MU_RULE_ROUNDING`` of contact.c: a rule with more digits, by Newton's method."""
+    x = np.polynomial.legendre.leggauss(DRIVEN_NODES)[0].astype(np.longdouble)
+    for _ in range(4):
+        value, slope = legendre(x)
+        x -= value / slope
+    beyond, steep = 3.0 * ((1.0 - x) / 2.0) ** 2 - 2.0 * ((1.0 - x) / 2.0) ** 3, (1.0 - x * x) / 4.0
+    weight = 6.0 * steep / ((1.0 - x * x) * legendre(x)[1] ** 2)
+    rule = piece_rule(DRIVEN_NODES)
+    assert float(np.abs(rule[:, 0] - beyond).max()) < 5e-16
+    assert float(np.abs(rule[:, 1] - weight).sum()) < 5e-15 / 3.0
 
 
 @needs_digits
