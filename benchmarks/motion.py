@@ -232,6 +232,44 @@ def times(share: float = 1.0) -> str:
     return markdown(header, rows)
 
 
+def wide_motions(n: int, ball: bool, seed: int = 6) -> Iterator[dict[str, Any]]:
+    """Yield keywords of ``motion`` in SI units over decades of every input, every tenth at rest:
+    from contacts that hardly slip to such as are all but rigid, at most 3e8 mu0 Fz / k."""
+    rng = np.random.default_rng(seed)
+    while n:
+        mu0, Fz, k, f = 10.0 ** rng.uniform((-2.0, -2.0, 4.0, 0.0), (0.0, 3.0, 11.0, 6.0))
+        x, y, way = 10.0 ** rng.uniform(-9.0, -4.0, 3)
+        if max(x, y, way) * k > 3e8 * mu0 * Fz:
+            continue
+        n -= 1
+        v0 = 0.0 if rng.random() < 0.1 else 2.0 * math.pi * f * way
+        phases = rng.uniform(0.0, 360.0, 3)
+        case: dict[str, Any] = {"mu0": mu0, "Fz": Fz, "k": k, "f": f, "v0": v0}
+        case |= {"x": (x, phases[0]), "y": (y, phases[1])}
+        if not ball and rng.random() < 0.3:
+            case["normal"] = (Fz * rng.uniform(0.0, 0.95), phases[2])
+        yield case
+
+
+def drawn(share: float = 1.0) -> str:
+    """Processor time of single motions over decades of every input at 1e-6, and how many give
+    up."""
+    rows = []
+    for contact in ("spring", "ball"):
+        n = max(10, round(5_000 * share))
+        ms, lost = [], 0
+        for case in wide_motions(n, contact == "ball"):
+            start = time.process_time()
+            answer = motion(**case, contact=contact, tolerance=1e-6, threads=1)
+            ms.append(1e3 * (time.process_time() - start))
+            lost += answer.error_estimate > 1e-6 * case["mu0"]
+        quantiles = np.quantile(ms, (0.5, 0.99, 0.999, 1.0))
+        rows.append([contact, f"{n:,}", *map(quantity, quantiles.tolist()), f"{lost:,}"])
+    return markdown(
+        ("contact", "motions", "median [ms]", "99 %", "99.9 %", "slowest", "given up"), rows
+    )
+
+
 PHASES = np.linspace(0.0, 360.0, 73)
 SPEEDS = (0.02, 0.1, 0.5)  # m/s
 LOOKS = ((BLUE, "-"), (RED, "--"), (INK, "-."))  # of their curves
@@ -285,7 +323,7 @@ def _draw_phases(axes: Any) -> list[list[str]]:
     return rows
 
 
-SECTIONS = sections(errors, beside_tables, times, pictures)
+SECTIONS = sections(errors, beside_tables, times, drawn, pictures)
 
 if __name__ == "__main__":
     main(__doc__, SECTIONS, share=1.0)

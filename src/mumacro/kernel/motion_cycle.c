@@ -261,12 +261,15 @@ static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *
     const double slowest = speed + sqrt(speed * speed + 2.0 * m->acceleration * way);
     double share, time, at_last[2];
     mu_moment last;
-    int whole = 1;
+    int whole = 1, brief;
     if (slowest * stick.length > 2.0 * way) {
         whole = 0;
         stick.length = 2.0 * way / slowest;
     }
-    if (*fresh && stick.length < MU_MOTION_SHORT) {
+    /* a part that is short because the motion is fast may end in itself; what is left of a step may
+     * not */
+    brief = whole && stick.length < MU_MOTION_SHORT;
+    if (*fresh && brief) {
         share = 1.0;
         last = mu_stuck_at(&stick, 1.0, at_last);
     } else {
@@ -304,7 +307,7 @@ static void mu_take_stick(mu_march *march, const mu_shaken *m, double end, int *
         march->f[0] = fx;
         march->f[1] = fy;
     }
-    *fresh = *fresh && share == 1.0 && stick.length < MU_MOTION_SHORT;
+    *fresh = *fresh && share == 1.0 && brief;
     if (share < 1.0) {
         /* slip that rounding ends goes on for a step */
         *ends = march->at.tau - march->began > MU_MOTION_SHORT;

@@ -112,7 +112,7 @@ def test_the_bounds_of_a_ball_along_hold_beside_its_corner(table: Surrogate) -> 
     rng = np.random.default_rng(7)
     y = 1.5 * (1.0 + rng.choice([-1.0, 1.0], 60) * 10.0 ** rng.uniform(-15.0, -1.0, 60))
     v = y * 10.0 ** rng.uniform(-20.0, -0.5, 60)
-    check(table, v, y, "ball", "along", extended.ball(v, y, 10, panels=44), slack=1e-9)
+    check(table, v, y, "ball", "along", extended.ball(v, y, 24, panels=44), slack=1e-9)
 
 
 # each of these was beyond its bound once: contact, direction, tolerance, quantity, v~, y~, true

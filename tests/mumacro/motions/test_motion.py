@@ -385,6 +385,20 @@ def test_springs_at_the_rim_that_large_steps_cannot_follow() -> None:
     assert off <= answer.error_estimate
 
 
+@pytest.mark.parametrize("size", [1e5, 1e6, 1e7, 1e8, 5e8])
+def test_a_ball_that_is_all_but_rigid_keeps_its_tolerance(size: float) -> None:
+    """Its springs at the rim move by far more than 1e10 times what they can stretch."""
+    case = {**CASE, "v0": 1e-4 * size * L0 * CASE["omega"]}
+    case |= {"x": (0.02 * size * L0, 122.0), "y": (size * L0, 320.0)}
+    ball, spring = (
+        motion(**case, contact=contact, tolerance=1e-6) for contact in ("ball", "spring")
+    )
+    assert ball.error_estimate <= 1e-6 * CASE["mu0"]
+    # both are rigid but for stick at the turns
+    apart = math.hypot(ball.mu_macro - spring.mu_macro, ball.mu_lateral - spring.mu_lateral)
+    assert apart <= ball.error_estimate + spring.error_estimate + 10.0 * CASE["mu0"] / size
+
+
 def test_a_ball_at_rest_that_hardly_comes_to_stick_has_an_answer() -> None:
     """Some of its springs move by a thousandth less in each period: it took minutes."""
     rest = next(case for case in random_motions(40, ball=True, seed=5) if not case["v0"])
