@@ -360,6 +360,12 @@ for (const plot of document.querySelectorAll('.plot')) {
         Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 3)
       found.push(`${plot.id}: ${name} and ${other}`);
   }));
+  // all are seen whole
+  const svg = plot.getBoundingClientRect();
+  for (const [name, box] of all)
+    if (box.left < svg.left - 1 || box.right > svg.right + 1 || box.top < svg.top - 1 ||
+        box.bottom > svg.bottom + 1)
+      found.push(`${plot.id}: ${name} is cut`);
   // and none has a bar or the point on it
   const frame = plot.querySelector('clipPath rect')?.getBBox();
   const within = (one, box) => one.x >= box.x && one.x <= box.x + box.width &&

@@ -273,7 +273,7 @@ export function motionPanel(store, moved) {
       x: {
         domain: [middle(along) - wide, middle(along) + wide],
         log: false,
-        title: "x without the drag [µm]",
+        title: "x − v₀t [µm]",
       },
       y: { domain: [middle(across) - tall, middle(across) + tall], log: false, title: "y [µm]" },
     });

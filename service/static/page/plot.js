@@ -5,7 +5,7 @@ import d3 from "./d3.js";
 const { axisBottom, axisLeft, axisRight, axisTop, drag, scaleLinear, scaleLog, select, line } = d3;
 
 const DIGIT = 7; // pixels of a figure beside an axis
-const MOST = 0.6; // of the width of a frame, which a text in it has
+const MOST = 0.6; // of the width of a frame, which the name of a regime has
 const BAR = 40; // places of a bar, at which it may lie on a text
 const FINGER = 36; // pixels from the point, within which a finger takes it
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -136,7 +136,7 @@ export class Plot {
    * Two axes with titles; so many pixels are left free above, to the right and below, `from` is
    * the lowest tick.
    */
-  axes({ x, y, top = 10, right = 12, below = 0 }) {
+  axes({ x, y, top = 10, right = 24, below = 0 }) {
     const foot = 42 + below;
     this.y = scaleOf(y).range([this.height - foot, top]);
     const side = ticked(axisLeft(this.y).tickSizeOuter(0), this.y, 44, y.from);
@@ -242,7 +242,7 @@ export class Plot {
       const { x, y, width, height } = text.getBBox();
       const place = [x - 1, y, x + width + 1, y + height];
       const left = this.texts.some((one) => !one.left && overlap(one.place, place));
-      const wide = box && width > MOST * box.width;
+      const wide = text.matches(".area") && width > MOST * box.width;
       this.texts.push({ text, place, left: left || wide });
     }
   }
