@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import h5py
 import netCDF4
 import numpy as np
 import pytest
@@ -114,6 +115,7 @@ EDITS: dict[str, tuple[Edit, str]] = {
         for name in ("cells", "errors")
         for value in ("many", 1.5, [1.0, 2.0, 3.0], np.nan, -1.0)
     },
+    "cells that are not whole": (stating("cells", [1.5, 2.0]), "cells must be whole numbers"),
     **{
         f"quantities {names}": (
             stating("quantities", names, ""),
@@ -200,6 +202,41 @@ def test_an_edited_file_is_refused_by_name(tmp_path: Path, name: str) -> None:
     with pytest.raises(TableError, match=reason) as caught:
         Surrogate.open(path)
     assert str(path) in str(caught.value)
+
+
+#: a variable of the plain grid, stored in another way -> why it is refused
+STORED: dict[str, tuple[str, Callable[[Any], Any], dict[str, Any], str]] = {
+    "an axis of two dimensions": (
+        "v_tilde",
+        lambda values: values.reshape(-1, 1),
+        {},
+        "variable 'v_tilde' in / is no axis",
+    ),
+    "two chunks": (
+        "mu_ratio",
+        lambda values: values,
+        {"chunks": (16, 31), "compression": "gzip", "shuffle": True},
+        "'mu_ratio' in / is stored in an unknown way",
+    ),
+    "a chunk that is larger": (
+        "mu_ratio",
+        lambda values: values,
+        {"chunks": (32, 31), "maxshape": (None, 31), "compression": "gzip", "shuffle": True},
+        "'mu_ratio' in / is stored in an unknown way",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", STORED)
+def test_a_variable_that_is_stored_otherwise_is_refused(tmp_path: Path, name: str) -> None:
+    variable, shaped, storage, reason = STORED[name]
+    path = Path(shutil.copy(TABLE, tmp_path / "copy.nc"))
+    with h5py.File(path, "r+") as root:
+        values = shaped(root[variable][()])
+        del root[variable]
+        root.create_dataset(variable, data=values, **storage)
+    with pytest.raises(TableError, match=reason):
+        read_table(path)
 
 
 def block_of(table: Table, index: int, contact: str = "spring") -> Block:
