@@ -309,8 +309,10 @@ class Search:
         on_cusp = off(places[:, None], np.arange(places.size))[:, 0]  # the next double is off, too
         low[on_cusp] = high[on_cusp] = places[on_cusp]
         i, j = np.flatnonzero((below >= 0) & ~on_cusp), np.flatnonzero((above >= 0) & ~on_cusp)
-        low[i] = last_double(lambda q: off(q, i), x[below[i]], places[i])[1]
-        high[j] = last_double(lambda q: ~off(q, j), places[j], x[above[j]])[0]
+        rows, upward = np.r_[i, j], np.repeat([False, True], [i.size, j.size])[:, None]
+        first, last = np.r_[x[below[i]], places[j]], np.r_[places[i], x[above[j]]]
+        before, after = last_double(lambda q: off(q, rows) ^ upward, first, last)
+        low[i], high[j] = after[: i.size], before[i.size :]
         return low, high
 
 

@@ -47,7 +47,7 @@ from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array
 from mumacro.questions.input_curve import EVERYWHERE, InputCurve
 from mumacro.questions.law import law
-from mumacro.questions.search import TINY, Found, Search, samples
+from mumacro.questions.search import TINY, Search, samples
 from mumacro.questions.solutions import Reach, Solution
 from mumacro.surrogate import Surrogate
 
@@ -263,10 +263,13 @@ def _solution_over(
     if within is None and unknown in EVERYWHERE and not search.constant:
         reach = _without_limit(curve, reach)
     targets = tuple(levels.tolist())
-    roots = tuple(
-        () if reach.only_approaches(target) else _with_regimes(curve, of_target)
+    kept = [
+        [] if reach.only_approaches(target) else of_target
         for target, of_target in zip(targets, found, strict=True)
-    )
+    ]
+    values = np.array([root.value for of_target in kept for root in of_target])
+    regimes = iter(curve.answer(values).regime.tolist() if values.size else [])
+    roots = tuple(tuple(Root(*root[:4], next(regimes)) for root in of_target) for of_target in kept)
     return TableSolution(
         unknown,
         "mu_macro",
@@ -278,14 +281,6 @@ def _solution_over(
         curve=curve,
         within=within,
     )
-
-
-def _with_regimes(curve: InputCurve, found: list[Found]) -> tuple[Root, ...]:
-    """Return roots with the regime there."""
-    if not found:
-        return ()
-    regimes = curve.answer(np.array([root.value for root in found])).regime.tolist()
-    return tuple(Root(*root[:4], regime) for root, regime in zip(found, regimes, strict=True))
 
 
 def _in_unit(solution: TableSolution, unknown: str, per: float) -> TableSolution:
