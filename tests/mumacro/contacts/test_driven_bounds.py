@@ -30,10 +30,10 @@ def legendre(x: Array) -> tuple[Array, Array]:
     return value, DRIVEN_NODES * (x * value - before) / (x * x - 1.0)
 
 
-#: largest median of bound over error, by row of extended.ROWS
-WIDEST = (400.0, 400.0, 1000.0, 3000.0, 3000.0)
-#: of a ball along, whose springs slip backwards with y~ below 10: where the rule has much to miss
-WIDEST_OF_RULE = (100.0, 100.0, 300.0, 400.0, 600.0)
+#: largest median of bound over error
+WIDEST = 100.0
+#: by row of extended.ROWS, beside the lines where the rule has much to miss
+WIDEST_OF_RULE = (100.0, 100.0, 200.0, 200.0, 400.0)
 
 
 def check(
