@@ -523,9 +523,9 @@ class Surrogate:
         Returns
         -------
         Answer
-            With ``mu_macro_low`` and ``mu_macro_high`` for an interval of k.  Or the container of
-            the inputs: pandas objects give a DataFrame, xarray objects a Dataset, Dask stays lazy
-            (:mod:`mumacro.frames`).
+            With ``mu_macro_low`` and ``mu_macro_high`` for an interval of k.  Of a frame, a table
+            or a Dataset one of the same kind, with a column for each output by its path; Series
+            give a DataFrame, DataArrays a Dataset, arrays of Dask a dict of lazy ones.
 
         Raises
         ------

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 else:  # a signature shows the name, in place of a union of twenty lines
 
     class Numbers:
-        """A number in SI, a text with a unit such as "2um", a quantity, or an array of these."""
+        """A number in SI, a text with a unit such as "2um", a quantity, or an array of numbers."""
 
     class Oscillation:
         """An amplitude, a text such as "2um@90deg", (amplitude, phase in degrees), or a list of
