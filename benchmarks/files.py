@@ -84,8 +84,8 @@ def files(cases: float) -> str:
             def ours(source: Path = source, out: Path = out) -> object:
                 return evaluate_files([source], out, surrogate, force=True)
 
-            def peer(source: Path = source, out: Path = out, sign: str = decimal) -> object:
-                return by_pyarrow(source, out.with_stem("peer"), surrogate, sign)
+            def peer(source: Path = source, out: Path = out, sign: str = decimal) -> None:
+                by_pyarrow(source, out.with_stem("peer"), surrogate, sign)
 
             work: dict[str, Callable[[], object]] = {"ours": ours, "peer": peer}
             best = best_of(ROUNDS, work)

@@ -22,7 +22,7 @@ from service import tables
 from service.admission import Admission, client_of
 from service.problems import RequestError
 from service.settings import Settings
-from tests.support.places import TABLES
+from tests.support.places import ROOT, TABLES
 from tests.support.serving import CASE, Server, connect, head, running, to_end
 
 MOTION: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.01}
@@ -340,7 +340,7 @@ def test_a_stop_waits_for_no_file_system_that_hangs(tmp_path: Path) -> None:
     program.write_text(HANGING)
     command = [sys.executable, str(program)]
     settings = {"MUMACRO_SHUTDOWN_GRACE_S": "0", "MUMACRO_TABLES": str(TABLES)}
-    with running(command, tmp_path / "log.jsonl", **settings) as server:
+    with running(command, tmp_path / "log.jsonl", ROOT, **settings) as server:
         status, _, body = server.ask("GET", "/readyz")
         assert (status, b"do not answer" in body) == (503, True)
         assert server.stop() == 0

@@ -290,7 +290,7 @@ def test_rows_are_answered_and_refused_like_each_of_them_alone(client: Any, rows
 def test_a_number_is_an_interval_of_itself_beside_one_and_a_rigid_contact_is_not(
     client: Any,
 ) -> None:
-    rows = [{"k_low": 8e5, "k_high": 1.2e6}, {"k": 1e6}, {"k": "rigid"}]
+    rows: list[Case] = [{"k_low": 8e5, "k_high": 1.2e6}, {"k": 1e6}, {"k": "rigid"}]
     answer = client.post(BATCH, json=[{**SPRING, **row} for row in rows]).json()
     band, number, rigid = answer["results"]
     assert band["mu_macro_low"] < band["mu_macro"] < band["mu_macro_high"]

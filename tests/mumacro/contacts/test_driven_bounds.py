@@ -93,7 +93,7 @@ def test_the_bounds_of_the_rule_hold_where_coefficients_are_trusted_to_fall(
 
 def test_the_weights_of_the_rule_are_right_to_their_bound() -> None:
     """``MU_RULE_ROUNDING`` of contact.c: a rule with more digits, by Newton's method."""
-    x = np.polynomial.legendre.leggauss(DRIVEN_NODES)[0].astype(np.longdouble)
+    x: Any = np.polynomial.legendre.leggauss(DRIVEN_NODES)[0].astype(np.longdouble)
     for _ in range(4):
         value, slope = legendre(x)
         x -= value / slope

@@ -67,7 +67,7 @@ NUMBERS: dict[str, Any] = {
     "Decimals": [decimal.Decimal("0.5"), fractions.Fraction(2)],
     "objects": np.array([0.5, 2], object),
     "masked": np.ma.array([0.5, 2.0]),
-    "memory": memoryview(np.array([0.5, 2.0])),
+    "memory": memoryview(np.array([0.5, 2.0]).data),
     "Series": pd.Series([0.5, 2.0]),
     "Index": pd.Index([0.5, 2.0]),
     "categories": pd.Series([0.5, 2.0]).astype("category"),

@@ -44,10 +44,9 @@ def test_no_crossing_of_a_random_course_is_missed(costly: bool, seed: int) -> No
     terms = [*enumerate(zip(sizes, phases, strict=True), 1)]
 
     def course(x: Array) -> Array:
-        return np.sum(
-            [size * np.sin(n * x + phase) for n, (size, phase) in terms],
-            axis=0,
-        )
+        sines = [size * np.sin(n * x + phase) for n, (size, phase) in terms]
+        total: Array = np.sum(sines, axis=0)
+        return total
 
     fine = np.linspace(-math.pi, math.pi, 20_001)
     value = course(fine)
