@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.answer import Answer, add
+from mumacro.answer import Answer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, named, other_amplitude
-from mumacro.inputs.doubts import Remark
 from mumacro.kernel.arrays import Codes
+from mumacro.notes import Note, add
 from mumacro.outputs.entry import Output
 from mumacro.outputs.evaluation import chosen, cost
 
@@ -40,7 +40,7 @@ def body_and_query(members: Mapping[str, Any], options: BatchOptions) -> dict[st
 
 @dataclass
 class Batch:
-    """Cases, and how they are answered.  ``errors``, ``n_errors`` and ``remarks`` grow while the
+    """Cases, and how they are answered.  ``errors``, ``n_errors`` and ``notes`` grow while the
     slices are taken."""
 
     table: LoadedTable
@@ -50,7 +50,7 @@ class Batch:
     rows: bool
     errors: list[dict[str, Any]] = field(default_factory=list)
     n_errors: int = 0
-    remarks: list[Remark] = field(default_factory=list)
+    notes: list[Note] = field(default_factory=list)
     count: Callable[[LoadedTable, Codes], None] = lambda _table, _codes: None
 
     @classmethod
@@ -104,8 +104,8 @@ class Batch:
         """The answer as JSON, piece by piece, in the form of the body."""
         yield from (write_rows if self.rows else write_columns)(self._answers())
         end: dict[str, Any] = {"errors": self.errors, "n_errors": self.n_errors}
-        if self.remarks:
-            end["remarks"] = self.remarks
+        if self.notes:
+            end["remarks"] = [note.as_remark for note in self.notes]
         yield b"," + dump(end | self.table.signature)[1:]
 
     def _answers(self) -> Iterator[Answer[Any]]:
@@ -115,8 +115,8 @@ class Batch:
             answer = self.table.surrogate.answer(part, self.outputs)
             self.count(self.table, answer.source_code)
             self._tell(answer.source_code, start)
-            for remark in answer.remarks:
-                add(self.remarks, remark)
+            for note in answer.notes:
+                add(self.notes, note)
             yield answer
 
     def _tell(self, codes: Codes, start: int) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from fastapi import Request, Response
 
 import mumacro
-from mumacro.contacts.geometries import contact_of, doubts_of
+from mumacro.contacts.geometries import contact_of
 from mumacro.errors import InputError
 from mumacro.fits.measured_points import read_points, unknowns_beside
 from mumacro.inputs.decoding import TextError
@@ -42,8 +42,6 @@ async def post_stiffness(request: Request, contact: StiffnessRequest) -> Respons
     with with_members(**more):
         arguments = contact.model_dump(exclude_none=True, exclude={"geometry", "include"})
         answer = contact_of(contact.geometry, **arguments).to_dict()
-        if doubts := doubts_of(arguments):
-            answer["remarks"] = doubts
         answer |= more
         return Json({"geometry": contact.geometry, **answer, "api_version": API_VERSION})
 

@@ -20,7 +20,6 @@ from mumacro.outputs import MEMBERS
 from mumacro.outputs.evaluation import chosen
 from mumacro.questions.law import Law
 from mumacro.questions.solve_for import TableSolution
-from mumacro.validity import load_rows
 
 from .. import API_VERSION
 from ..admission import compute
@@ -88,14 +87,6 @@ def _answer_at(
     return table.surrogate.answer(cases, chosen(question.outputs, cases))
 
 
-def _remarks_on(
-    question: Any, unknown: str, case: dict[str, Any], stiffening: Stiffening | None
-) -> dict[str, Any]:
-    """Remarks on the model, if there are any."""
-    rows = load_rows(unknown, case, question.contact, stiffening)
-    return {MODEL: rows} if rows else {}
-
-
 @router.post(
     "/law",
     responses={200: {"model": LawAnswer}, **POST_PROBLEMS},
@@ -111,9 +102,9 @@ async def post_law(request: Request, question: LawRequest) -> Response:
         along = question.along
         axis = {"along": along, "unit": unit_of(along), "values": law.values}
         border = [{"value": mark.value, "mu_macro": mark.mu_macro} for mark in law.border]
-        remarks = _remarks_on(question, along, question.inputs, law.stiffening)
-        remarks |= more
-        return Json({**axis, **nested(columns), "border": border, **remarks, **table.signature})
+        model = {MODEL: [note.as_row for note in law.notes]} if law.notes else {}
+        said = {**model, **more}
+        return Json({**axis, **nested(columns), "border": border, **said, **table.signature})
 
     with with_members(**more):
         return await compute(request, answer)
@@ -236,7 +227,6 @@ def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
     for k, end in zip(ends_in(case) or (), answer.get("ends", ()), strict=True):
         end |= {"k": k, **_in_quantity(question, end, unit)}
     answer |= {"quantity": question.quantity}
-    answer |= _remarks_on(question, name, case, solution.stiffening)
     return {**answer, **table.signature}
 
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from mumacro import plotting
 from mumacro.inputs.cases import Cases
-from mumacro.inputs.doubts import Remark, lines_of
 from mumacro.inputs.doubts import remarks as doubts
 from mumacro.inputs.fields import RAD_PER_CYCLE
 from mumacro.inputs.kind import AMPLITUDE, Kind
+from mumacro.notes import Note
 from mumacro.results import Result, Rows, cell
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
@@ -90,7 +90,7 @@ class Answer(Result, Generic[Number]):
         *BAND,
         "mu_ratio",
         "outputs",
-        "remarks_on_outputs",
+        "notes_on_outputs",
         "source_code",
     )
 
@@ -119,7 +119,7 @@ class Answer(Result, Generic[Number]):
         self.gradient = self.gradient_bound = None
         self.outputs: Mapping[str, Any] = _NOTHING
         #: where an output is missing or doubtful
-        self.remarks_on_outputs: list[Remark] = []
+        self.notes_on_outputs: list[Note] = []
 
     # --- by name ----------------------------------------------------------------------------------
 
@@ -233,19 +233,19 @@ class Answer(Result, Generic[Number]):
         return self._cases is not None or self._plain is not None
 
     @property
-    def remarks(self) -> list[Remark]:
-        """What is doubtful, one remark for each input or output: ``row``, the kind of doubt;
-        ``field``; ``cases``, how many; ``text``.  Empty where nothing is."""
-        return self.remarks_in({})
+    def notes(self) -> list[Note]:
+        """The remarks on the cases, and on outputs that are missing or doubtful;
+        ``mumacro.validity.notes_of`` has what the model leaves out in one case, too."""
+        return self.notes_in({})
 
-    def remarks_in(self, units: Mapping[str, str]) -> list[Remark]:
-        """:attr:`remarks`, with a value in the unit that ``units`` has for its input, as it was
+    def notes_in(self, units: Mapping[str, str]) -> list[Note]:
+        """:attr:`notes`, with a value in the unit that ``units`` has for its input, as it was
         typed."""
         if not self._has_cases:
-            return [*self.remarks_on_outputs]
+            return [*self.notes_on_outputs]
         cases = self.cases
         on_inputs = doubts(cases.columns, cases.f is not None, {**cases.units, **units})
-        return [*on_inputs, *self.remarks_on_outputs]
+        return [*on_inputs, *self.notes_on_outputs]
 
     # --- other forms ------------------------------------------------------------------------------
 
@@ -339,9 +339,6 @@ class Answer(Result, Generic[Number]):
     def _rows(self) -> Rows | None:
         return [(path, cell(x)) for path, x in self.columns.items()] if self._is_one() else None
 
-    def _below(self) -> list[str]:
-        return lines_of(self.remarks)
-
     def _in_full(self) -> tuple[str, Rows | None, list[str]]:
         """Of one case what the command prints."""
         if not self._is_one():
@@ -389,15 +386,6 @@ if TYPE_CHECKING:
 
         mu_macro_low: Number
         mu_macro_high: Number
-
-
-def add(remarks: list[Remark], remark: Remark) -> None:
-    """Add a remark to others, or its cases to one of the same row and field."""
-    for other in remarks:
-        if (other["row"], other["field"]) == (remark["row"], remark["field"]):
-            other["cases"] += remark["cases"]
-            return
-    remarks.append(remark)
 
 
 def nested(values: Mapping[str, Any]) -> dict[str, Any]:

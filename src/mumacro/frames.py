@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.answer import TEXTS, Answer, add
+from mumacro.answer import TEXTS, Answer
 from mumacro.errors import InputError
 from mumacro.inputs.carried import labelled_in_si, library
 from mumacro.inputs.cases import Cases, library_of
 from mumacro.inputs.columns import is_column, read_column
-from mumacro.inputs.doubts import Remark, lines_of
 from mumacro.inputs.fields import QUANTITY_OF
+from mumacro.notes import Note, add
 from mumacro.outputs import MEMBERS
 from mumacro.outputs.evaluation import chosen
 from mumacro.table.atlas import REGIMES, SOURCES
@@ -133,7 +133,7 @@ def _as_polars(answer: Answer[Any]) -> Any:
             columns.append(pl.Series(path, words, dtype=pl.Enum(texts)))
         else:
             columns.append(pl.Series(path, np.ravel(answer[path])))
-    for line in lines_of(answer.remarks):
+    for line in (note.line for note in answer.notes):
         warnings.warn(line, UserWarning, stacklevel=4)  # of whoever called evaluate
     return pl.DataFrame(columns)
 
@@ -193,27 +193,27 @@ def _of_chunks(
     one = Cases.of({**constants, **dict.fromkeys(arrays, np.full(1, np.nan))})
     # the names and types of all outputs are known before the cases are
     types = {path: np.asarray(x).dtype for path, x in _outputs(surrogate, one, include).items()}
-    remarks: list[Remark] = []
+    notes: list[Note] = []
 
     def evaluate(*columns: Any) -> tuple[Any, ...]:
         inputs = {**constants, **dict(zip(arrays, columns, strict=True))}
         cases = Cases.of(inputs, strict=strict)
-        outputs = _outputs(surrogate, cases, include, remarks)
+        outputs = _outputs(surrogate, cases, include, notes)
         return tuple(np.asarray(outputs[path], dtype) for path, dtype in types.items())
 
     if not any(library_of(x) == "xarray" for x in arrays.values()):
         return _as_dask(evaluate, arrays, types)
-    return _as_xarray(evaluate, arrays, types, remarks)
+    return _as_xarray(evaluate, arrays, types, notes)
 
 
 def _outputs(
-    surrogate: Any, cases: Cases, include: Sequence[str], remarks: list[Remark] | None = None
+    surrogate: Any, cases: Cases, include: Sequence[str], notes: list[Note] | None = None
 ) -> dict[str, Any]:
-    """All outputs of cases by path; their remarks are added to ``remarks``."""
+    """All outputs of cases by path; what is said of them is added to ``notes``."""
     answer = surrogate.answer(cases, chosen(include, cases))
-    if remarks is not None:
-        for remark in answer.remarks:
-            add(remarks, remark)
+    if notes is not None:
+        for note in answer.notes:
+            add(notes, note)
     return {path: answer[path] for path in answer.paths}
 
 
@@ -221,7 +221,7 @@ def _as_xarray(
     evaluate: Callable[..., Any],
     arrays: Mapping[str, Any],
     types: Mapping[str, Any],
-    remarks: list[Remark],
+    notes: list[Note],
 ) -> Any:
     """A Dataset; what Dask has not computed yet has no remarks."""
     import xarray as xr
@@ -237,8 +237,8 @@ def _as_xarray(
     for path, array in dataset.items():
         unit, meaning = _ABOUT_TEXTS.get(str(path)) or MEMBERS[str(path)]
         array.attrs = {"units": unit.replace("-", "1"), "long_name": meaning}
-    if remarks and dataset["mu_macro"].chunks is None:
-        lines = (f"{one['field']} ({one['cases']} cases): {one['text']}" for one in remarks)
+    if notes and dataset["mu_macro"].chunks is None:
+        lines = (f"{one.field} ({one.cases} cases): {one.text}" for one in notes)
         dataset.attrs["remarks"] = "\n".join(lines)  # as text, which netCDF can hold
     return dataset
 

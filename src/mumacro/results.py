@@ -9,11 +9,12 @@ import html
 import math
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mumacro.errors import MumacroError
+from mumacro.notes import REMARK, WARNING, Note, Remark, texts_of
 
 Rows = list[tuple[str, ...]]  # of texts, as a table shows them
 
@@ -26,7 +27,7 @@ class Result:
     """What a question gives back.
 
     Each kind of result says what its columns are, and may say its members as JSON has them, a
-    heading, rows and what is said below; the forms are made here.
+    heading, rows and notes; the forms are made here.
     """
 
     __slots__ = ()
@@ -35,6 +36,26 @@ class Result:
     def columns(self) -> Mapping[str, Any]:
         """The result as a table: numbers and texts by path."""
         raise NotImplementedError
+
+    if TYPE_CHECKING:
+
+        @property
+        def notes(self) -> Sequence[Note]:
+            """What is said beside the result."""
+
+    else:
+        notes = ()  # no property, which a field of this name could not set
+
+    @property
+    def remarks(self) -> list[Remark]:
+        """What is doubtful, one remark for each input or output: ``row``, the kind of doubt;
+        ``field``; ``cases``, how many; ``text``.  Empty where nothing is."""
+        return [note.as_remark for note in self.notes if note.word == REMARK]
+
+    @property
+    def warnings(self) -> list[str]:
+        """The texts of the notes that warn."""
+        return texts_of(self.notes, WARNING)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the members as JSON has them, the same on the command line and over HTTP, there
@@ -83,7 +104,7 @@ class Result:
 
     def _below(self) -> list[str]:
         """What is said below, in a line each."""
-        return []
+        return [note.line for note in self.notes]
 
     def _in_full(self) -> tuple[str, Rows | None, list[str]]:
         """Heading, rows and what is said below, where there is room for all of it."""

@@ -44,6 +44,7 @@ from typing import Any
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import real
+from mumacro.notes import WARNING, Note
 from mumacro.results import Result, Rows
 
 SMALLEST, LARGEST = 1e-60, 1e60  # numbers in SI; every product of them below is a double
@@ -146,7 +147,9 @@ class Contact(Result):
     #: the largest [Pa]: Hertz's, or the mean one under a flat punch, singular at its edge
     pressure: float
     contact: str = "spring"  #: the kind that ``evaluate`` computes with this k: "spring" or "ball"
-    warnings: tuple[str, ...] = ()  #: where the theory behind k is off; also issued by ``warnings``
+    #: warnings where the theory behind k is off, also issued by ``warnings``; and remarks on the
+    #: geometry
+    notes: tuple[Note, ...] = ()
 
     def keys(self) -> tuple[str, ...]:
         """The keywords for ``evaluate``: k, and the kind of contact where it is not one spring."""
@@ -163,16 +166,14 @@ class Contact(Result):
         return {name: getattr(self, name) for name in NUMBERS}
 
     def _members(self) -> dict[str, Any]:
-        return {**self.columns, "contact": self.contact, "warnings": self.warnings}
+        remarks = {"remarks": self.remarks} if self.remarks else {}
+        return {**self.columns, "contact": self.contact, "warnings": self.warnings, **remarks}
 
     def _heading(self) -> str:
         return f"<Contact: {self.contact}>"
 
     def _rows(self) -> Rows:
         return [(name, f"{x:.4g}", f"[{NUMBERS[name]}]") for name, x in self.columns.items()]
-
-    def _below(self) -> list[str]:
-        return [f"warning: {text}" for text in self.warnings]
 
     def length_scale(self, mu0: float, Fz: float) -> float:
         """l0 = mu0 Fz / k [m], eq. (5): the elongation at which the contact slips."""
@@ -196,7 +197,7 @@ def _moduli(first: Material, second: Material) -> tuple[float, float]:
 
 def _hertz_cautions(
     half_width: float, radius: float, first: Material, second: Material, power: float
-) -> tuple[str, ...]:
+) -> tuple[Note, ...]:
     """Warnings of a Hertzian contact that is wide beside the radius of the body; InputError where
     it is wider.
 
@@ -206,10 +207,11 @@ def _hertz_cautions(
     if share <= WIDE:
         return ()
     if share <= 1.0:
-        return (
+        text = (
             f"the contact's half width {half_width:.3g} m is {share:.2g} of the radius: "
-            f"Hertz's theory holds well below {WIDE:g}, k is rough",
+            f"Hertz's theory holds well below {WIDE:g}, k is rough"
         )
+        return (Note(WARNING, text),)
     soft = [body for body in (first, second) if body.E < SOFT]
     if soft:
         in_gpa = (
@@ -379,7 +381,7 @@ def hertz_cylinder(
         _ellipse_compliance(narrow, wide, Material(body.E, 0.0), along) * (1.0 - body.nu**2)
         for body in (first, second)
     )
-    return Contact(shear, normal, b, 2.0 * Fz / (math.pi * b * length), warnings=cautions)
+    return Contact(shear, normal, b, 2.0 * Fz / (math.pi * b * length), notes=cautions)
 
 
 def _ellipse_compliance(narrow: float, wide: float, body: Material, along: bool) -> float:

@@ -7,8 +7,8 @@ inputs of a case, and have no row here: quasi-static contact, which needs masses
 """
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any, Protocol, TypedDict
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,9 @@ from mumacro.inputs.doubts import FURTHEST, UNITS
 from mumacro.inputs.fields import RAD_PER_CYCLE, RIGID
 from mumacro.inputs.kind import AMPLITUDE, SPRINGS_OF, Kind, kind_of
 from mumacro.inputs.numbers import plain
+from mumacro.notes import ASSUMES, Note, Row
 from mumacro.outputs.settling import REMAINING, decay_of_springs
+from mumacro.outputs.tabulated import Tabulated
 
 #: names of the rows, as in the table of docs/validity.md
 ROWS = (
@@ -42,87 +44,91 @@ _ADAPTS = 1e-7, 1e-4
 _PERIODS, _WATTS = 100.0, 0.1  # above them there is a row on settling, and one on heat
 
 
-class Evaluates(Protocol):
-    """What answers cases: a :class:`mumacro.Surrogate`."""
+class Said(NamedTuple):
+    """What is said of one case, and the digits that it supports."""
 
-    @property
-    def evaluate(self) -> Callable[..., Any]:
-        """The method of that name."""
-
-
-class Row(TypedDict):
-    """One row: its name in :data:`ROWS`, a sentence, and the relative change of mu_macro, or
-    None where its size is unknown."""
-
-    row: str
-    text: str
-    effect: float | None
+    notes: list[Note]
+    digits: int
 
 
-def model_rows(
-    surrogate: Evaluates,
-    case: Mapping[str, Any],
-    contact: str = "spring",
-    direction: str = "across",
-) -> list[Row]:
-    """Evaluate a case, and return its :func:`rows_of`.
+def notes_of(answer: Answer[float], units: Mapping[str, str] | None = None) -> Said:
+    """Return what is said of an evaluated case: what the model leaves out, with the size of each
+    effect, what is doubtful, and how many digits k supports.
 
-    ``case`` has inputs of :meth:`mumacro.Surrogate.evaluate`.
+    The only values of the table beyond the answer are those of its neighbours: the other contact,
+    and seven values of k up to 10 % away.  ``units`` are those that were typed, by input.
 
     Examples
     --------
     >>> from mumacro import Surrogate
     >>> case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 2e4, "v0": 0.01}
-    >>> [k_row] = [row for row in model_rows(Surrogate.open(), case) if row["row"] == "k is known"]
-    >>> k_row["text"]
-    '10 % more or less of k changes mu_macro by 6 %: give k as an interval, or fit k'
+    >>> said = notes_of(Surrogate.open().evaluate(case))
+    >>> [note.text for note in said.notes if note.row == "k is known"], said.digits
+    (['10 % more or less of k changes mu_macro by 6 %: give k as an interval, or fit k'], 4)
     """
-    return rows_of(_answer_to(surrogate, case, contact, direction))
+    effect = effect_of(answer)
+    doubts = answer.notes_in(units or {})
+    return Said([*_assumptions(answer, effect), *doubts], digits(effect))
 
 
 def rows_of(answer: Answer[float], effect: float | None = None) -> list[Row]:
-    """Return the rows of docs/validity.md that an evaluated case falls in.
+    """Return the rows of docs/validity.md that an evaluated case falls in, as JSON has them.
 
-    Of an interval of k the rows are those of its geometric middle.  Where k is an interval or has a
-    deviation, there is no row of k: the answer shows what follows.  A contact without oscillation
-    has no rows.  ``effect`` is :func:`effect_of` the answer, where it is there already.
+    Where no contact has the case's y~, the remark on that stands alone.  ``effect`` is
+    :func:`effect_of` the answer, where it is there already.
     """
-    cases, y = answer.cases, answer.y_tilde
-    kind, inputs = cases.kind, cases.columns
-    swing = inputs[AMPLITUDE if kind.normal else "y0"]
-    if math.isinf(inputs["k"]) or inputs["omega"] == 0.0 or swing == 0.0:
+    effect = effect_of(answer) if effect is None else effect
+    if _is_beyond(answer):
+        return [note.as_row for note in answer.notes if note.row == UNITS]
+    return [note.as_row for note in _assumptions(answer, effect)]
+
+
+def _is_elastic(answer: Answer[float]) -> bool:
+    """Whether a contact is elastic and shaken."""
+    inputs = answer.cases.columns
+    swing = inputs[AMPLITUDE if answer.cases.kind.normal else "y0"]
+    return not (math.isinf(inputs["k"]) or inputs["omega"] == 0.0 or swing == 0.0)
+
+
+def _is_beyond(answer: Answer[float]) -> bool:
+    """Whether no contact has the y~ of a case that is elastic and shaken."""
+    return _is_elastic(answer) and not answer.cases.kind.normal and answer.y_tilde > FURTHEST
+
+
+def _assumptions(answer: Answer[float], effect: float) -> list[Note]:
+    """What the model leaves out in a case, of an interval of k in its geometric middle.
+
+    Where k is an interval or has a deviation, there is no note on k: the answer shows what follows.
+    """
+    if not _is_elastic(answer) or _is_beyond(answer):
         return []
-    y = 0.0 if kind.normal else y
-    if y > FURTHEST:  # no contact has such a y~: the remark on it stands alone
-        doubts = [one for one in answer.remarks if one["row"] == UNITS]
-        return [{"row": UNITS, "text": one["text"], "effect": None} for one in doubts]
+    cases, kind = answer.cases, answer.cases.kind
+    inputs, y = cases.columns, 0.0 if kind.normal else answer.y_tilde
     uncertain = cases.ends is not None or np.any(cases.std.get("k", 0.0))
-    rows = [
-        _row_of_other_contact(answer, kind),
-        None
-        if uncertain
-        else _row_of_stiffness(effect_of(answer) if effect is None else effect, y),
-        _row_of_tilt(float(inputs["mu0"]), y),
-        *(() if kind.direction else _rows_of_cycle(answer, inputs)),
+    notes = [
+        _on_other_contact(answer, kind),
+        None if uncertain else _on_stiffness(effect, y),
+        _on_tilt(float(inputs["mu0"]), y),
+        *(() if kind.direction else _on_cycle(answer, inputs)),
     ]
-    return sorted((row for row in rows if row is not None), key=lambda row: ROWS.index(row["row"]))
+    return sorted((note for note in notes if note is not None), key=lambda one: ROWS.index(one.row))
 
 
-def load_rows(
+def load_notes(
     unknown: str,
     case: Mapping[str, Any],
     contact: str = "spring",
     stiffening: Stiffening | None = None,
-) -> list[Row]:
-    """The row on k where Fz is swept or solved for, if there is one to add.
+) -> list[Note]:
+    """Return the note on k where Fz is swept or solved for, if there is one.
 
     ``case`` has the other five inputs, ``stiffening`` says how k grows, as in the result.
 
     Examples
     --------
     >>> case = {"mu0": 0.3, "k": 1e6, "y0": 2e-6, "f": 2e4, "v0": 0.01}
-    >>> [k_row] = load_rows("Fz", case, "ball", Stiffening(1 / 3, 10.0))
-    >>> k_row["text"]
+    >>> [note] = load_notes("Fz", case, "ball", Stiffening(1 / 3, 10.0))
+    >>> note.text
     'k grows as Fz^0.333 from its value at Fz = 10 N'
     """
     if unknown != "Fz" or case.get("k") in (math.inf, RIGID):
@@ -138,44 +144,48 @@ def load_rows(
             f"Fz^{ROUGH[0]:g} to Fz^{ROUGH[1]:g} for rough surfaces: give Fz at which k "
             f"holds{advice}"
         )
-    return [{"row": "k is known", "text": text, "effect": None}]
+    return [Note(ASSUMES, text, "k is known")]
 
 
-def k_effect(
-    surrogate: Evaluates,
-    case: Mapping[str, Any],
-    contact: str = "spring",
-    direction: str = "across",
-    uncertainty: float = K_UNCERTAINTY,
+def effect_of(
+    answer: Answer[Any], uncertainty: float = K_UNCERTAINTY, place: int | None = None
 ) -> float:
-    """Evaluate a case, and return :func:`effect_of` its answer."""
-    return effect_of(_answer_to(surrogate, case, contact, direction), uncertainty)
-
-
-def effect_of(answer: Answer[float], uncertainty: float = K_UNCERTAINTY) -> float:
     """Return by how much, relatively, mu_macro may differ [-] where k may by the factor 1 +
     ``uncertainty`` up or down; 0 if rigid.
 
     The largest of seven values of k counts, since mu_macro is no straight line in k.  Over an
-    interval of k it is half the width.
+    interval of k it is half the width.  Of many cases it is that of the one at ``place`` of the
+    flattened arrays, which have groups; without it InputError.
     """
+    if place is None and np.shape(answer.mu_macro):
+        raise InputError("answer", np.shape(answer.mu_macro), "that to one case")
+    v, y, mu = (
+        float(np.ravel(x)[place or 0]) for x in (answer.v_tilde, answer.y_tilde, answer.mu_macro)
+    )
+    cases = answer.cases
+    if cases.ends is None:
+        return effect_of_groups(answer._surrogate.tabulated, cases.kind, v, y, uncertainty)
+    low, high = (float(np.ravel(getattr(answer, name))[place or 0]) for name in BAND)
+    return _share(0.5 * (high - low), mu)
+
+
+def effect_of_groups(
+    tabulated: Tabulated, kind: Kind, v: float, y: float, uncertainty: float = K_UNCERTAINTY
+) -> float:
+    """Return :func:`effect_of` a case with one k, by its v~ and y~."""
     if not 0.0 < uncertainty < math.inf:
         raise InputError("uncertainty", uncertainty, "finite and > 0")
-    cases, kind, middle_mu = answer.cases, answer.cases.kind, answer.mu_macro
-    v, y = answer.v_tilde, answer.y_tilde
-    if cases.ends is not None:
-        low, high = (getattr(answer, name) for name in BAND)
-        half_width = 0.5 * (high - low)
-    elif math.isinf(v) or math.isinf(y):  # rigid, or not shaken: k is no part of the answer
+    if math.isinf(v) or math.isinf(y):  # rigid, or not shaken: k is no part of the answer
         return 0.0
-    else:
-        factors = np.geomspace(1.0 / (1.0 + uncertainty), 1.0 + uncertainty, 7)
-        amplitudes = np.full(factors.size, y) if kind.normal else y * factors
-        tabulated = answer._surrogate.tabulated
-        ratios = tabulated.values("mu_ratio", v * factors, amplitudes, kind)[0]
-        middle_mu = float(ratios[3])  # the middle one is k
-        half_width = float(np.abs(ratios - ratios[3]).max())
-    return 0.0 if half_width == 0.0 else half_width / middle_mu if middle_mu > 0.0 else math.inf
+    factors = np.geomspace(1.0 / (1.0 + uncertainty), 1.0 + uncertainty, 7)
+    amplitudes = np.full(factors.size, y) if kind.normal else y * factors
+    ratios = tabulated.values("mu_ratio", v * factors, amplitudes, kind)[0]
+    # the middle one is k
+    return _share(float(np.abs(ratios - ratios[3]).max()), float(ratios[3]))
+
+
+def _share(half_width: float, middle: float) -> float:
+    return 0.0 if half_width == 0.0 else half_width / middle if middle > 0.0 else math.inf
 
 
 def digits(uncertainty: float, least: int = 4, most: int = 6) -> int:
@@ -192,18 +202,7 @@ def digits(uncertainty: float, least: int = 4, most: int = 6) -> int:
     return min(max(math.ceil(-math.log10(uncertainty)) + 1, least), most)
 
 
-def _answer_to(
-    surrogate: Evaluates, case: Mapping[str, Any], contact: str, direction: str
-) -> Answer[float]:
-    """Return the answer to one case; raise InputError for several."""
-    answer: Answer[float] = surrogate.evaluate(case, contact=contact, direction=direction)
-    if np.shape(answer.mu_macro):
-        shapes = {name: np.shape(value) for name, value in case.items()}
-        raise InputError("case", shapes, "one case: numbers")
-    return answer
-
-
-def _row_of_other_contact(answer: Answer[float], kind: Kind) -> Row | None:
+def _on_other_contact(answer: Answer[float], kind: Kind) -> Note | None:
     alternative = "spring" if kind.contact else "ball"
     try:
         alternative_kind = kind_of(alternative, kind.names["direction"])
@@ -226,10 +225,10 @@ def _row_of_other_contact(answer: Answer[float], kind: Kind) -> Row | None:
         f"{names[alternative]} with the same k has mu_macro = {alternative_mu:.4g} in place of "
         f"{mu:.4g}"
     )
-    return {"row": "one spring", "text": text, "effect": change}
+    return Note(ASSUMES, text, "one spring", effect=change)
 
 
-def _row_of_stiffness(effect: float, y: float) -> Row | None:
+def _on_stiffness(effect: float, y: float) -> Note | None:
     margin, change = f"{100.0 * K_UNCERTAINTY:g} %", f"{plain(100.0 * effect, 2)} %"
     if effect >= 1e-3:
         advice = "give k as an interval, or fit k"
@@ -241,10 +240,10 @@ def _row_of_stiffness(effect: float, y: float) -> Row | None:
         )
     else:
         return None
-    return {"row": "k is known", "text": text, "effect": effect}
+    return Note(ASSUMES, text, "k is known", effect=effect)
 
 
-def _row_of_tilt(mu0: float, y: float) -> Row | None:
+def _on_tilt(mu0: float, y: float) -> Note | None:
     effect = _NORMAL * mu0 * _TILT * y
     if not effect >= 0.01:
         return None
@@ -252,11 +251,11 @@ def _row_of_tilt(mu0: float, y: float) -> Row | None:
         f"a surface that is tilted by {_TILT:g} rad changes Fz by "
         f"{plain(100.0 * min(effect, 1e3), 2)} % within each period"
     )
-    return {"row": "constant normal force", "text": text, "effect": effect}
+    return Note(ASSUMES, text, "constant normal force", effect=effect)
 
 
-def _rows_of_cycle(answer: Answer[float], six: Mapping[str, Any]) -> list[Row]:
-    """Rows that follow from the slip path of a period, taken from one spring."""
+def _on_cycle(answer: Answer[float], six: Mapping[str, Any]) -> list[Note]:
+    """What follows from the slip path of a period, taken from one spring."""
     groups = (np.array([x]) for x in (answer.v_tilde, answer.y_tilde))
     rate = float(decay_of_springs(answer._surrogate.tabulated, *groups).rate[0])
     slip = 2.0 * math.pi * rate  # over l0
@@ -264,16 +263,16 @@ def _rows_of_cycle(answer: Answer[float], six: Mapping[str, Any]) -> list[Row]:
     force = six["mu0"] * six["Fz"]
     # [m], [Hz]
     slip_path, frequency = slip * force / six["k"], six["omega"] / RAD_PER_CYCLE
-    watts, rows = force * slip_path * frequency, list[Row]()
+    watts, notes = force * slip_path * frequency, list[Note]()
     if math.isinf(periods):
         text = "nothing slips at rest: this is the largest force that the contact can hold"
-        rows.append({"row": "steady cycle", "text": text, "effect": None})
+        notes.append(Note(ASSUMES, text, "steady cycle"))
     elif periods > _PERIODS:
         text = (
             f"creeping: a large disturbance falls to 1 % within {plain(periods, 3)} periods, "
             f"{plain(periods / frequency, 3)} s"
         )
-        rows.append({"row": "steady cycle", "text": text, "effect": None})
+        notes.append(Note(ASSUMES, text, "steady cycle"))
     if _ADAPTS[0] < slip_path < _ADAPTS[1]:
         effect = _RATE * math.log(100.0) / six["mu0"]
         text = (
@@ -281,11 +280,11 @@ def _rows_of_cycle(answer: Answer[float], six: Mapping[str, Any]) -> list[Row]:
             "new speed only after micrometres of slip, and a speed 100 times higher changes mu0 by "
             f"about {plain(100.0 * effect, 2)} %"
         )
-        rows.append({"row": "Coulomb friction", "text": text, "effect": effect})
+        notes.append(Note(ASSUMES, text, "Coulomb friction", effect=effect))
     if watts > _WATTS:
         text = (
             f"the contact turns {plain(watts, 2)} W into heat and slips "
             f"{plain(slip_path * frequency, 2)} m per second"
         )
-        rows.append({"row": "no wear, no heating", "text": text, "effect": None})
-    return rows
+        notes.append(Note(ASSUMES, text, "no wear, no heating"))
+    return notes

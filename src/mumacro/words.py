@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from mumacro.answer import Answer
-from mumacro.inputs.doubts import UNITS
 from mumacro.inputs.fields import LIKE, PER_UNIT
 from mumacro.inputs.kind import Kind
 from mumacro.inputs.units import Scale, scale_of, suited
+from mumacro.notes import Note
 from mumacro.outputs import MEMBERS
 from mumacro.results import Rows, known, tidy_zeros
-from mumacro.validity import digits, effect_of, rows_of
+from mumacro.validity import notes_of
 
 REGIMES = {
     "continuous": "slips all the time",
@@ -35,34 +35,25 @@ def of_one_case(
     the one that suits them; with ``shown`` that many digits, in SI.
     """
     kind, case = answer.cases.kind, answer.cases.columns
-    effect = effect_of(answer)
-    count = digits(effect if shown is None else 0.0)
-    rows = _rows_of(answer, kind, shown, count, units or {})
-    notes: Rows = [
-        ("assumes", f"{called(row['row'], kind)}: {in_words(row['text'], case)}")
-        for row in rows_of(answer, effect)
-        if row["row"] != UNITS  # a doubtful unit is a remark
-    ]
-    remarks = answer.remarks_in(units or {})
-    notes += [("remark", f"{one['field']}: {one['text']}") for one in remarks]
+    said = notes_of(answer, units)
+    rows = _rows_of(answer, kind, shown, said.digits, units or {})
+    notes: Rows = [(one.word, in_words(one, kind, case).about) for one in said.notes]
     return rows, notes, f"numerical error  {answer.error_bound:.2g}"
 
 
-def called(row: str, kind: Kind) -> str:
-    """A row of :data:`mumacro.validity.ROWS` in the words of its contact: a ball is not one spring.
+def in_words(note: Note, kind: Kind, case: Mapping[str, Any]) -> Note:
+    """A note on a case in the words of its contact, a ball is not one spring, and with what is
+    typed in place of an advice.
 
-    >>> from mumacro.inputs.kind import SPRING, kind_of
-    >>> called("one spring", SPRING), called("one spring", kind_of("ball", "along"))
-    ('one spring', 'a ball')
+    >>> from mumacro.inputs.kind import kind_of
+    >>> in_words(Note("assumes", "...", "one spring"), kind_of("ball"), {"k": 1.0}).row
+    'a ball'
     """
-    return _CALLED.get((row, kind.names["contact"]), row)
-
-
-def in_words(text: str, case: Mapping[str, Any]) -> str:
-    """The advice of a model line with what is typed in place of its words."""
     unit, scale = suited("N/m", case["k"])
     k = scale.of_si(case["k"])
-    return text.replace("give k as an interval", f"give k={0.9 * k:.3g}..{1.1 * k:.3g}{unit}")
+    advice = f"give k={0.9 * k:.3g}..{1.1 * k:.3g}{unit}"
+    row = _CALLED.get((note.row, kind.names["contact"]), note.row)
+    return note._replace(row=row, text=note.text.replace("give k as an interval", advice))
 
 
 #: paths that have the unit of an input

@@ -71,7 +71,7 @@ def test_no_case_of_the_documents_is_doubted() -> None:
         if any((x < 0.0).any() for x in columns.values()):
             continue  # an illegal value, which is shown as such
         count += 1
-        doubts = [one for one in remarks(columns) if one["row"] == UNITS]
+        doubts = [one for one in remarks(columns) if one.row == UNITS]
         assert doubts == [], (page, case)
     assert count > 40
 

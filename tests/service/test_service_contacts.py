@@ -9,7 +9,7 @@ import pytest
 
 from mumacro import Surrogate
 from mumacro.contacts.geometries import ARGUMENTS, GEOMETRIES
-from mumacro.validity import digits, k_effect, model_rows
+from mumacro.validity import digits, effect_of, rows_of
 from tests.support.cases import Case
 from tests.support.comparing import close
 
@@ -128,8 +128,9 @@ def test_included_quantities_are_the_librarys(
 def test_what_the_model_leaves_out(client: Any, surrogate: Surrogate) -> None:
     case = {**RIG, **ACROSS, "v0": 0.02}
     answer = client.post(PATH, json={**case, "contact": "ball", "include": ["model"]}).json()
-    assert answer["model"] == model_rows(surrogate, case, contact="ball")
-    assert answer["digits"] == digits(k_effect(surrogate, case, contact="ball"))
+    evaluated = surrogate.evaluate(case, contact="ball")
+    assert answer["model"] == rows_of(evaluated)
+    assert answer["digits"] == digits(effect_of(evaluated))
     body = {**RIG, "y0": 2e-6, "k_low": 8e5, "k_high": 1.2e6, "v0": 0.02, "include": ["model"]}
     assert "k is known" not in [row["row"] for row in client.post(PATH, json=body).json()["model"]]
 

@@ -29,11 +29,11 @@ from mumacro.inputs.names import suggestion
 from mumacro.inputs.numbers import check_signs
 from mumacro.inputs.signs import THOUSANDS
 from mumacro.inputs.units import Scale, belongs_to_value, scale_of, suited
+from mumacro.notes import Note
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import names_in
 from mumacro.results import known, tidy_zeros
 from mumacro.surrogate import Surrogate
-from mumacro.validity import Row, digits, k_effect
 
 ABOUT_INPUTS = f"""\
 inputs, each as name=value, in SI units or with a unit as in y0=2um:
@@ -471,24 +471,6 @@ def case_line(case: Mapping[str, Any], units: Mapping[str, str], kind: Kind, *mo
     return "; ".join([", ".join([*parts, *more]), ", ".join(kind.names.values())])
 
 
-def format_for(
-    options: argparse.Namespace, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind = SPRING
-) -> str:
-    """How numbers are printed: with ``--digits``, or as many as the stiffness of a case
-    supports."""
-    return f".{count_for(options, surrogate, case, kind)}g"
-
-
-def count_for(
-    options: argparse.Namespace, surrogate: Surrogate, case: Mapping[str, Any], kind: Kind = SPRING
-) -> int:
-    """The number of digits that is printed: that of ``--digits``, or what the stiffness of a case
-    supports."""
-    if options.digits is not None:
-        return int(options.digits)
-    return digits(k_effect(surrogate, case, *kind.names.values()))
-
-
 def number_of(name: str, advice: str = "") -> Callable[[str], float]:
     """The reader of an option that is a number, as 0.15, 0,15 or 15%; argparse says the fault of
     another text, with the ``advice``."""
@@ -546,9 +528,9 @@ def in_columns(rows: Iterable[Sequence[str]]) -> str:
     return "\n".join("  ".join(row).rstrip() for row in zip(*cells_of_rows, strict=True))
 
 
-def model_lines(rows: Sequence[Row]) -> list[str]:
-    """What is said about the model, below a result."""
-    return [in_columns([("assumes", f"{row['row']}: {row['text']}")]) for row in rows]
+def note_lines(notes: Iterable[Note]) -> list[str]:
+    """What is said below a result."""
+    return [in_columns([(note.word, note.about)]) for note in notes]
 
 
 def write_result(

@@ -19,7 +19,7 @@ from mumacro.cli.common import (
     open_table,
 )
 from mumacro.files.run import evaluate_files
-from mumacro.inputs.doubts import Remark
+from mumacro.notes import Remark
 
 _COLUMNS = """\
 columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [um]:

@@ -142,6 +142,4 @@ def _text(result: Fit, digit_count: int | None) -> str:
     for i, one in enumerate(result.solutions[1:], 2):
         values = ", ".join(f"{name} = {one[name]:.4g} {unit_of(name)}" for name in result.values)
         rows.append((f"solution {i}", values))
-    doubts = [f"warning: {text}" for text in result.warnings]
-    doubts += [f"{remark['row']}: {remark['text']}" for remark in result.remarks]
-    return "\n".join([in_columns(rows), *doubts])
+    return "\n".join([in_columns(rows), *(note.line for note in result.notes)])

@@ -120,4 +120,4 @@ def _load(words: Sequence[str], column: str | None) -> Any:
 def _text(found: LoopFit) -> str:
     """Values with intervals, energy, scatter, and notes."""
     samples = ("samples", str(found.residuals.size), "", f"{found.contact}, {found.cycles} cycles")
-    return "\n".join([in_columns([*found._rows(), samples]), *(f"note: {x}" for x in found.notes)])
+    return "\n".join([in_columns([*found._rows(), samples]), *(note.line for note in found.notes)])

@@ -19,7 +19,6 @@ from mumacro.inputs.case import read_one
 from mumacro.inputs.fields import unit_of
 from mumacro.questions.law import law as friction_law
 from mumacro.results import known, tidy_zeros
-from mumacro.validity import load_rows
 
 EXAMPLE = 'mumacro law "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz" --along v0 0.1mm/s 1m/s'
 
@@ -64,13 +63,11 @@ def run(words: Sequence[str]) -> str:
         **kind.names,
         **case,
     )
-    model = load_rows(along, law.case, options.contact, law.stiffening)
     columns = law.columns
     if options.json:
-        said = {"model": model} if model else {}
-        return as_json({**law.to_dict(), **said, "table": common.table_members(surrogate)})
+        return as_json({**law.to_dict(), "table": common.table_members(surrogate)})
     middle = float(law.values[law.values.size // 2])
-    count = common.count_for(options, surrogate, {**case, along: middle}, kind)
+    count = law.digits if options.digits is None else options.digits
     units = common.units_in(options.words, **{along: ends})
     unit = Unit.of(along, middle, units, options.digits)
     of_k = ", for the geometric middle of k" if law.k_ends else ""
@@ -78,7 +75,7 @@ def run(words: Sequence[str]) -> str:
         f"{c.name} at {along} = {unit.shown(c.value, count, options.digits)} {unit.name}{of_k}"
         for c in law.border
     ]
-    notes += common.model_lines(model)
+    notes += common.note_lines(law.notes)
     if options.out is not None:
         heads = [f"{name} [{unit_of(name)}]" if name in (along, "k") else name for name in columns]
         in_si = dict(zip(heads, columns.values(), strict=True))

@@ -7,7 +7,6 @@ from pathlib import Path
 from mumacro import plotting
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns, read_case
-from mumacro.inputs.doubts import lines_of
 from mumacro.inputs.fields import in_help
 from mumacro.inputs.kind import CONTACTS
 from mumacro.inputs.oscillation import read_oscillation
@@ -78,7 +77,7 @@ def run(words: Sequence[str]) -> str:
             if name != "error_estimate"
         ]
         error = f"numerical error of both about {motion.error_estimate:.1e}"
-        notes = [*(f"warning: {x}" for x in motion.warnings), *lines_of(motion.remarks)]
+        notes = [note.line for note in motion.notes]
         lines = "\n".join([in_columns(rows), error, *notes])
     if options.out is None:
         return lines

@@ -24,7 +24,6 @@ from mumacro.inputs.names import suggestion
 from mumacro.motions.solve_motion import UNKNOWNS
 from mumacro.questions.solve_for import Root, TableSolution, solve_for
 from mumacro.results import tidy_zeros
-from mumacro.validity import load_rows
 
 EXAMPLE = 'mumacro solve-for y0 "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s" --target 0.15'
 _TARGET = ": give mu_macro, such as 0.15 or 15%, or with --ratio mu_macro/mu0"
@@ -109,10 +108,8 @@ def run(words: Sequence[str]) -> str:
     rows = [(k, root) for k, one in solutions.items() for root in one.roots[0]]
     if not rows:
         raise ImpossibleError(solution.reason() + _hint(options, case, solution))
-    model = load_rows(unknown, common.middle_of(case), options.contact, solution.stiffening)
     if options.json:
-        said = {"model": model} if model else {}
-        return as_json({**solution.to_dict(), **said, "table": common.table_members(surrogate)})
+        return as_json({**solution.to_dict(), "table": common.table_members(surrogate)})
     if options.out is not None:
         heads = _heads(f"{unknown} [{solution.unit}]", "k [N/m]" if solution.ends else None)
         in_si = [(*((k,) if solution.ends else ()), *root) for k, root in rows]
@@ -120,7 +117,7 @@ def run(words: Sequence[str]) -> str:
         return common.write_result(options.out, columns, solution.plot)
     units = common.units_in(options.words, **{unknown: options.between or ()})
     first_root = rows[0][1].value
-    count = common.count_for(options, surrogate, {**case, unknown: first_root}, kind)
+    count = solution.digits if options.digits is None else options.digits
     unit = Unit.of(unknown, first_root, units, options.digits)
     k_unit = Unit.of("k", rows[-1][0], units, options.digits) if solution.ends else None
     table = _table(unknown, rows, unit, k_unit, count, options.digits)
@@ -131,7 +128,7 @@ def run(words: Sequence[str]) -> str:
     ]
     ranges = [solution.reason()] if solution.roots[0] and solution.reason() else []
     line = common.case_line(case, units, kind)
-    return "\n".join([line, table, *ranges, *without, *common.model_lines(model)])
+    return "\n".join([line, table, *ranges, *without, *common.note_lines(solution.notes)])
 
 
 def _solutions_by_k(solution: TableSolution, case: Mapping[str, Any]) -> dict[Any, TableSolution]:

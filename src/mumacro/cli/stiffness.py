@@ -12,7 +12,6 @@ from mumacro.contacts.geometries import (
     GEOMETRIES,
     INSTEAD,
     contact_of,
-    doubts_of,
     read_argument,
 )
 from mumacro.stiffness import MATERIALS, NUMBERS, Material
@@ -84,13 +83,11 @@ def run(words: Sequence[str]) -> str:
     arguments |= _of_materials(options, arguments)
     contact = contact_of(options.geometry, **arguments)
     if options.json:
-        said = {"remarks": remarks} if (remarks := doubts_of(arguments)) else {}
-        return as_json({"geometry": options.geometry, **contact.to_dict(), **said})
+        return as_json({"geometry": options.geometry, **contact.to_dict()})
     form = f".{options.digits or 4}g"  # what materials and geometry give at best
     rows = [
         (name, f"{contact.columns[name]:{form}}", f"[{unit}]") for name, unit in NUMBERS.items()
     ]
     option = "" if contact.contact == "spring" else f" --contact {contact.contact}"
     rows += [("contact", contact.contact, ""), ("paste", f"k={contact.k:{form}}{option}", "")]
-    doubts = [one["text"] for one in doubts_of(arguments)]
-    return "\n".join([in_columns(rows), *(f"warning: {x}" for x in (*contact.warnings, *doubts))])
+    return "\n".join([in_columns(rows), *(note.line for note in contact.notes)])

@@ -4,13 +4,15 @@ Command line, service and page derive their fields from :data:`GEOMETRIES` and :
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from mumacro.errors import InputError
 from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import real
-from mumacro.inputs.doubts import UNITS, Remark
+from mumacro.inputs.doubts import UNITS
 from mumacro.inputs.names import unknown_name
+from mumacro.notes import REMARK, Note
 from mumacro.stiffness import (
     AXES,
     Contact,
@@ -85,12 +87,19 @@ GEOMETRIES = {
 def contact_of(geometry: str, /, **arguments: Any) -> Contact:
     """The contact of one of :data:`GEOMETRIES`, from its arguments and those of the bodies in SI.
 
-    Its warnings are in it.  InputError for an unknown geometry, and an argument that is missing,
+    Its warnings, and remarks on lengths that bodies do not usually have, are in it.
+    InputError for an unknown geometry, and an argument that is missing,
     unknown, no number or out of bounds.
 
     >>> contact_of("ball", radius=5e-3, Fz=10.0, E=210e9, nu=0.3).contact
     'ball'
     """
+    contact = _contact(geometry, **arguments)
+    return replace(contact, notes=(*contact.notes, *doubts_of(arguments)))
+
+
+def _contact(geometry: str, **arguments: Any) -> Contact:
+    """The contact without the remarks on its lengths."""
     if geometry not in GEOMETRIES:
         raise InputError("geometry", geometry, f"one of {', '.join(GEOMETRIES)}")
     entry = GEOMETRIES[geometry]
@@ -123,28 +132,28 @@ def contact_of(geometry: str, /, **arguments: Any) -> Contact:
 def _of_diameter(geometry: str, diameter: float, **arguments: Any) -> Contact:
     """The contact of a ball, pin or cylinder whose diameter is given."""
     try:
-        return contact_of(geometry, radius=0.5 * diameter, **arguments)
+        return _contact(geometry, radius=0.5 * diameter, **arguments)
     except InputError as error:
         if error.field != "radius":
             raise
         raise InputError("diameter", diameter, f"twice a radius that is {error.bound}") from None
 
 
-def doubts_of(arguments: Mapping[str, Any]) -> list[Remark]:
+def doubts_of(arguments: Mapping[str, Any]) -> list[Note]:
     """Lengths of a geometry that bodies do not usually have, each with a question.
 
-    >>> [doubt["text"] for doubt in doubts_of({"radius": 5.0})]
+    >>> [doubt.text for doubt in doubts_of({"radius": 5.0})]
     ['radius = 5 m: is it 5 mm? Usual is 1e-06 to 0.5 m']
     """
     least, most = _USUAL
-    remarks: list[Remark] = []
+    remarks: list[Note] = []
     for name in ("radius", "diameter", "length"):
         value = arguments.get(name)
         if value is None or least <= value <= most:
             continue
         question = f"is it {value:.6g} mm?" if value > most else "is it in metres?"
         text = f"{name} = {value:.6g} m: {question} Usual is {least:g} to {most:g} m"
-        remarks.append({"row": UNITS, "field": name, "cases": 1, "text": text})
+        remarks.append(Note(REMARK, text, UNITS, name))
     return remarks
 
 

@@ -16,7 +16,6 @@ from mumacro.answer import BAND, DEFAULT, TEXTS
 from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, other_amplitude
-from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import ENDS, GAP, LIKE, SI, refusal
 from mumacro.inputs.headings import absent, find_heads, meant_by
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
@@ -26,6 +25,7 @@ from mumacro.inputs.signs import Signs
 from mumacro.inputs.text_tables import numbers_of
 from mumacro.inputs.units import Scale, scale_of, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes
+from mumacro.notes import Note
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import chosen, names_in, paths_of
 from mumacro.surrogate import Surrogate
@@ -134,7 +134,7 @@ class AnswerColumns(NamedTuple):
     columns: list[pa.Array]
     rejects: list[tuple[int, str, str]]  #: index, input and reason of each row without a result
     inputs: dict[str, Array]  #: the inputs in the units of the table, by heading
-    remarks: list[Remark]
+    notes: list[Note]
 
 
 def find_columns(
@@ -299,9 +299,9 @@ def answer_columns(
         name, reason = _field_and_reason(cases.reason(i))
         rejects.append((i, name, faults.get(name, {}).get(i, reason)))
     in_heads = {name: split_unit(heading)[1] for name, (heading, _) in columns.headings.items()}
-    remarks = result.remarks_in({name: unit for name, unit in in_heads.items() if unit})
+    notes = result.notes_in({name: unit for name, unit in in_heads.items() if unit})
     return AnswerColumns(
-        [arrays[path] for path in columns.answer_names], rejects, by_heading, remarks
+        [arrays[path] for path in columns.answer_names], rejects, by_heading, notes
     )
 
 

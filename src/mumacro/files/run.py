@@ -9,7 +9,6 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 import pyarrow as pa
 
-from mumacro.answer import add
 from mumacro.files import reading
 from mumacro.files.reading import Block, ParquetSource, TextSource, lines_of
 from mumacro.files.record_batch import (
@@ -24,9 +23,9 @@ from mumacro.files.record_batch import (
 from mumacro.files.writing import Output, csv_lines, written_as
 from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import KIND
-from mumacro.inputs.doubts import Remark
 from mumacro.inputs.kind import Kind, kind_of
 from mumacro.inputs.layout import Dialect
+from mumacro.notes import Note, Remark, add
 from mumacro.surrogate import Surrogate
 from mumacro.table.atomic import growing, to_disk
 
@@ -147,7 +146,7 @@ class _Run:
             if input_format == "parquet"
             else TextSource(self.files, dialect, names_of_columns(rigid), self.keeps_lines)
         )
-        self.surrogate, self.say, self.remarks = surrogate, say, list[Remark]()
+        self.surrogate, self.say, self.notes = surrogate, say, list[Note]()
         names, where = self.source.schema.names, self.source.where
         if words := [name for name in KIND if name in names]:
             first = next(self.source.blocks(0, words), None)
@@ -199,7 +198,7 @@ class _Run:
             state.rejected,
             self.out,
             self.rejects if state.rejected else None,
-            self.remarks,
+            [note.as_remark for note in self.notes],
         )
 
     def _opened_rejects(self, files: ExitStack) -> BinaryIO:
@@ -235,11 +234,11 @@ class _Run:
 
     def _piece(self, state: _State, block: Block) -> tuple[_State, Any]:
         """A block as it stands in the output, and the state after it."""
-        answers, rejects, inputs, remarks = answer_columns(
+        answers, rejects, inputs, notes = answer_columns(
             block.batch, self.surrogate, self.columns, block.signs
         )
-        for remark in remarks:
-            add(self.remarks, remark)
+        for note in notes:
+            add(self.notes, note)
         faults: dict[int, tuple[str | None, Any, str]] = {
             i: (name, block.value(i, self.columns.headings[name][0]), reason)
             for i, name, reason in rejects

@@ -19,6 +19,7 @@ from mumacro.fits.fitted import Fit
 from mumacro.fits.measured_points import STD, Measured
 from mumacro.fits.profile import Profile, quantile
 from mumacro.kernel.arrays import Array
+from mumacro.notes import WARNING, Note
 from mumacro.surrogate import Surrogate
 from mumacro.validity import HARDLY
 
@@ -195,8 +196,7 @@ class _Problem(Measured):
             chi2,
             chi2 / dof if dof else math.nan,
             solution_dicts,
-            tuple(self._warnings(values, interval, solution_dicts, chi2, dof)),
-            tuple(self.remarks()),
+            (*self._warnings(values, interval, solution_dicts, chi2, dof), *self.remarks()),
             self.contact,
             self.direction,
             points,
@@ -289,7 +289,7 @@ class _Problem(Measured):
         solutions: Sequence[Mapping[str, float]],
         chi2: float,
         dof: int,
-    ) -> list[str]:
+    ) -> list[Note]:
         messages = []
         low, high = interval.get("k", (1.0, 1.0))
         if self.std is None and dof == 0:
@@ -332,7 +332,7 @@ class _Problem(Measured):
             messages.append(
                 "one k for all loads, while k of a ball grows like Fz^(1/3): fit each load alone"
             )
-        return messages
+        return [Note(WARNING, text) for text in messages]
 
 
 def _around(values: Mapping[str, float], half_widths: Array) -> dict[str, tuple[float, float]]:

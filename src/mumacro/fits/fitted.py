@@ -10,9 +10,9 @@ import numpy as np
 from mumacro import plotting
 from mumacro.fits.measured_points import STD, UNKNOWNS, Measured
 from mumacro.fits.profile import quantile
-from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import RIGID
 from mumacro.kernel.arrays import Array, Bools
+from mumacro.notes import Note
 from mumacro.results import Result, Rows
 
 _CURVE = 200  # points of the fitted law
@@ -71,10 +71,9 @@ class Fit(Result):
         freedom, NaN without any.
     solutions : tuple of dict
         All minima that the points allow within 95 %, best first, each with values and ``chi2``.
-    warnings : tuple of str
-        Each names a value that the points do not determine, or a doubt about the fit.
-    remarks : tuple of dict
-        What is doubtful about the points, as ``remarks`` of an answer: row, field, cases, text.
+    notes : tuple of Note
+        Warnings, each of a value that the points do not determine, or a doubt about the fit; and
+        remarks, what is doubtful about the points.
     contact, direction : str
         Of the contact that was fitted.
     points : dict of ndarray
@@ -90,8 +89,7 @@ class Fit(Result):
     chi2: float
     reduced_chi2: float
     solutions: tuple[dict[str, float], ...]
-    warnings: tuple[str, ...]
-    remarks: tuple[Remark, ...]
+    notes: tuple[Note, ...] = field()
     contact: str
     direction: str
     points: dict[str, Array]
@@ -259,10 +257,6 @@ class Fit(Result):
 
     def _rows(self) -> Rows:
         return []
-
-    def _below(self) -> list[str]:
-        remarks = (f"{remark['row']}: {remark['text']}" for remark in self.remarks)
-        return [*(f"warning: {text}" for text in self.warnings), *remarks]
 
     def _in_full(self) -> tuple[str, Rows | None, list[str]]:
         """The values with their deviations and intervals."""

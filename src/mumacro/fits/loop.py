@@ -22,6 +22,7 @@ from mumacro.inputs.kind import kind_of
 from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.kernel.binding import kernels
+from mumacro.notes import NOTE, Note
 from mumacro.stopping import look
 
 LEAST, MOST = 6, 50_000  # samples of a loop
@@ -132,13 +133,13 @@ class _Loop:
         if np.ptp(measured) == 0.0:
             raise InputError("force", float(measured[0]), "one that changes")
         load = np.ascontiguousarray(np.broadcast_to(load, x.size))
-        self.notes: list[str] = []
+        self.notes: list[Note] = []
         self._take(x, measured, load, cycles)
         # units of about 1: the range of the displacement, the mean load
         self.length, self.load = float(np.ptp(self.x)), float(self.Fz.mean())
         if _against(self.x, self.force):
             self.force = -self.force
-            self.notes.append(_OTHER_SIGN)
+            self._note(_OTHER_SIGN)
         self._set_out()
 
     def _take(self, x: Array, force: Array, load: Array, chosen: tuple[int, int] | None) -> None:
@@ -167,9 +168,9 @@ class _Loop:
             if self.code:
                 bound = "at least one whole cycle of a ball: its springs have a state of their own"
                 raise InputError("displacement", "less than one cycle", bound)
-            self.notes.append(_OPEN)
+            self._note(_OPEN)
         elif self.number == 1 and not found.goes_on and self._is_first():
-            self.notes.append(_FIRST)
+            self._note(_FIRST)
 
     def _is_first(self) -> bool:
         """Whether the force of one closed cycle ends far from where it began."""
@@ -417,6 +418,9 @@ class _Loop:
 
     # --- notes ------------------------------------------------------------------------------------
 
+    def _note(self, text: str) -> None:
+        self.notes.append(Note(NOTE, text))
+
     def _say_open_ends(
         self, values: dict[str, float], interval: dict[str, tuple[float, float]], sticks: Bools
     ) -> None:
@@ -424,16 +428,12 @@ class _Loop:
         nothing else can be said."""
         if interval["mu0"][1] == math.inf:
             least = interval["mu0"][0]
-            self.notes.append(
-                f"the loop need not slip: mu0 has only a lower bound, {least:.4g} (95 %)"
-            )
+            self._note(f"the loop need not slip: mu0 has only a lower bound, {least:.4g} (95 %)")
             if sticks.all():
                 values["mu0"] = math.inf
         if interval["k"][1] == math.inf:
             least = interval["k"][0]
-            self.notes.append(
-                f"the loop need not stick: k has only a lower bound, {least:.4g} N/m (95 %)"
-            )
+            self._note(f"the loop need not stick: k has only a lower bound, {least:.4g} N/m (95 %)")
             if not sticks.any():
                 values["k"] = math.inf
 
@@ -469,7 +469,7 @@ class _Loop:
 
         forward = np.where(sticks, sign, 0.0) * slopes[self.counted]
         if sticks.any() and (share := effect(forward, 2.0 * float(np.abs(forward).max()))):
-            self.notes.append(
+            self._note(
                 f"the branches have different slopes: their forces differ by {share:.0%} of mu0 Fz"
             )
         if np.count_nonzero(slips) > LEAST:
@@ -477,7 +477,7 @@ class _Loop:
                 spread = float(np.ptp(values[slips]))
                 centred = np.where(slips, sign * (values - values[slips].mean()), 0.0)
                 if spread > 0.0 and (share := effect(centred, spread)):
-                    self.notes.append(
+                    self._note(
                         f"the sliding force depends on the {cause}: by {share:.0%} of mu0 Fz"
                     )
 

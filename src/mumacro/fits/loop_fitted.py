@@ -1,12 +1,13 @@
 """What a fit of a loop says: :class:`LoopFit`, from :func:`mumacro.fit_loop`."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from mumacro import plotting
 from mumacro.inputs.fields import unit_of
 from mumacro.kernel.arrays import Array
+from mumacro.notes import NOTE, Note, texts_of
 from mumacro.results import Result, Rows
 
 _UNITS = {"offset": "N", "drift": "N/sample"}
@@ -33,7 +34,7 @@ class LoopFit(Result):
         Work of the measured force over a cycle [J]; NaN for less than a cycle.
     cycles : int
         How many whole cycles there are.
-    notes : tuple of str
+    notes : tuple of Note
         What was done to the loop, what it leaves open, and what speaks against the model.
     contact : str
         "spring" or "ball".
@@ -48,7 +49,7 @@ class LoopFit(Result):
     scatter: float
     energy: float
     cycles: int
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...] = field()
     contact: str
     loop: dict[str, Array]
 
@@ -63,8 +64,10 @@ class LoopFit(Result):
         return plotting.plot_loop(x, force, fitted, title, ax)
 
     def _members(self) -> dict[str, Any]:
-        names = ("values", "interval", "scatter", "energy", "cycles", "notes", "contact", "loop")
-        return {name: getattr(self, name) for name in (*names, "residuals")}
+        names = ("values", "interval", "scatter", "energy", "cycles")
+        notes = texts_of(self.notes, NOTE)
+        rest = {"contact": self.contact, "loop": self.loop, "residuals": self.residuals}
+        return {**{name: getattr(self, name) for name in names}, "notes": notes, **rest}
 
     @property
     def columns(self) -> dict[str, Array]:
@@ -91,6 +94,3 @@ class LoopFit(Result):
     def _heading(self) -> str:
         count = f"{self.residuals.size} samples, {self.cycles} cycles"
         return f"<LoopFit of a {self.contact}: {count}>"
-
-    def _below(self) -> list[str]:
-        return [*self.notes]

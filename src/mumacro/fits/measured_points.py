@@ -10,7 +10,7 @@ import numpy as np
 from mumacro.errors import InputError
 from mumacro.inputs.cases import check, columns_of, library_of, no_such_input, select
 from mumacro.inputs.columns import to_si
-from mumacro.inputs.doubts import UNITS, Remark, remarks
+from mumacro.inputs.doubts import UNITS, remarks
 from mumacro.inputs.fields import LIKE, NAMES
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.layout import ColumnNames, Dialect
@@ -18,6 +18,7 @@ from mumacro.inputs.names import unknown_name
 from mumacro.inputs.text_tables import Most, Table, read_table
 from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Bools
+from mumacro.notes import REMARK, Note
 from mumacro.surrogate import Surrogate
 
 UNKNOWNS = ("k", "mu0")
@@ -209,7 +210,7 @@ class Measured:
             )
             _refuse("mu_macro", self.mu, self.mu <= top + scatter, bound)
 
-    def remarks(self) -> list[Remark]:
+    def remarks(self) -> list[Note]:
         """What is probably a wrong unit in the points."""
         doubts = remarks(self.columns, self._has_f)
         doubtful = self.mu > _PERCENT
@@ -221,7 +222,7 @@ class Measured:
             "cent? Then name the column mu_macro [%], or divide by 100"
         )
         cases = int(np.count_nonzero(doubtful))
-        return [{"row": UNITS, "field": "mu_macro", "cases": cases, "text": text}, *doubts]
+        return [Note(REMARK, text, UNITS, "mu_macro", cases=cases), *doubts]
 
     def elsewhere(self, cases: Any, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The inputs of :meth:`model` at other places: those given, the others as at all points."""

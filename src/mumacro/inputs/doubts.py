@@ -8,7 +8,7 @@ peak speed y0 omega no contact has.  A rigid contact is answered with what it as
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple, TypedDict
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE
 from mumacro.inputs.numbers import plain
 from mumacro.inputs.units import Scale, scale_of
 from mumacro.kernel.arrays import Array, Bools
+from mumacro.notes import REMARK, Note
 
 UNITS, STIFFNESS = "units", "k is known"  # rows of docs/validity.md
 MODEL = "model"  # the row of a case for which no model is needed
@@ -31,22 +32,12 @@ _USUAL = {name: INPUTS[name].usual for name in ("mu0", "Fz", "k", "y0", "omega",
 _USUAL["Fz_amplitude"] = INPUTS["Fz_amplitude"].usual
 
 
-class Remark(TypedDict):
-    """One remark: the row of docs/validity.md, the input, how many cases it is about, a sentence
-    on the first of them."""
-
-    row: str
-    field: str
-    cases: int
-    text: str
-
-
 def remarks(
     columns: Mapping[str, Any],
     frequency: bool = False,
     units: Mapping[str, str] | None = None,
     names: Mapping[str, str] | None = None,
-) -> list[Remark]:
+) -> list[Note]:
     """Return the remarks on cases, at most one for each input, and those on contacts that are not
     shaken, or rigid.
 
@@ -68,9 +59,9 @@ def remarks(
     >>> remarks(case)
     []
     >>> [remark] = remarks({**case, "k": 1.0})
-    >>> remark["field"], remark["text"]
+    >>> remark.field, remark.text
     ('k', 'l0 = mu0 Fz / k = 3 m, above 1 cm: is k = 1 in N/m?')
-    >>> remarks({**case, "k": 1.0}, units={"k": "N/mm"})[0]["text"]
+    >>> remarks({**case, "k": 1.0}, units={"k": "N/mm"})[0].text
     'l0 = mu0 Fz / k = 3 m, above 1 cm: is k = 0.001 N/mm right?'
     """
     if _usual(columns):
@@ -86,7 +77,7 @@ def remarks(
         for name, unit in (units or {}).items()
         if (scale := scale_of(name, unit)) is not None
     }
-    by_row: dict[str, Remark] = {}
+    by_field: dict[str, Note] = {}
     has_reason: Bools = np.zeros(shape, np.bool_)
     with np.errstate(all="ignore"):
         for field, where in (*_out_of_range(six), *_groups_out_of_range(six)):
@@ -97,35 +88,23 @@ def remarks(
             first = int(np.flatnonzero(new)[0])
             at = {name: float(column.flat[first]) for name, column in six.items()}
             name, text = _sentence(field, at, frequency, typed, names or {})
-            if name in by_row:
-                by_row[name]["cases"] += int(np.count_nonzero(new))
+            cases = int(np.count_nonzero(new))
+            if name in by_field:
+                earlier = by_field[name]
+                by_field[name] = earlier._replace(cases=earlier.cases + cases)
             else:
-                cases = int(np.count_nonzero(new))
-                by_row[name] = {"row": UNITS, "field": name, "cases": cases, "text": text}
+                by_field[name] = Note(REMARK, text, UNITS, name, cases=cases)
         still = _of_still(six, frequency)
         rigid = np.asarray(np.isposinf(six["k"]) & _oscillates(six))
         if not rigid.any():
-            return [*by_row.values(), *still]
+            return [*by_field.values(), *still]
         stiffest = float(np.fmax.reduce((six["mu0"] * six["Fz"] / six["y0"])[rigid]))
-        return [*by_row.values(), *still, _of_rigid(stiffest, int(np.count_nonzero(rigid)))]
-
-
-def lines_of(found: list[Remark]) -> list[str]:
-    """Return remarks in a line each, as a result shows them.
-
-    >>> lines_of([{"row": "units", "field": "k", "cases": 2, "text": "is k = 1 in N/m?"}])
-    ['remark: k: is k = 1 in N/m? (2 cases)']
-    """
-    return [
-        f"remark: {one['field']}: {one['text']}"
-        + (f" ({one['cases']} cases)" if one["cases"] > 1 else "")
-        for one in found
-    ]
+        return [*by_field.values(), *still, _of_rigid(stiffest, int(np.count_nonzero(rigid)))]
 
 
 def remarks_on_motion(
     columns: Mapping[str, Any], amplitudes: Mapping[str, Any], frequency: bool = False
-) -> list[Remark]:
+) -> list[Note]:
     """Return the remarks on motions, each amplitude as y0, and on those in which nothing moves.
 
     Parameters
@@ -143,16 +122,16 @@ def remarks_on_motion(
     >>> one = {name: np.array([value]) for name, value in columns.items()}
     >>> for size in (1.0, 0.0):
     ...     [remark] = remarks_on_motion(one, {"x": np.array([size])})
-    ...     remark["row"], remark["field"], remark["text"]
+    ...     remark.row, remark.field, remark.text
     ('units', 'x', 'x = 1 m, usual is 1e-12 to 0.02 m: is it in metres?')
     ('model', 'x', 'x = 0: the contact is not shaken, mu_macro is mu0')
     """
-    found: list[Remark] = []
+    found: list[Note] = []
     for name, size in amplitudes.items():
         input_ = "Fz_amplitude" if name == "normal" else "y0"
         amplitude = np.where(size > 0.0, size, math.nan)  # a part that is still is another matter
         for one in remarks({**columns, input_: amplitude}, frequency, names={input_: name}):
-            if one["field"] not in {other["field"] for other in found}:
+            if one.field not in {other.field for other in found}:
                 found.append(one)
     legal = np.ones_like(columns["mu0"], np.bool_)
     for name in ("mu0", "Fz", "k", "omega", "v0"):
@@ -162,28 +141,22 @@ def remarks_on_motion(
         parts = " = ".join(amplitudes)
         text = f"{parts} = 0: the contact is not shaken, mu_macro is mu0"
         count = int(np.count_nonzero(still))
-        found.append({"row": MODEL, "field": next(iter(amplitudes)), "cases": count, "text": text})
+        found.append(Note(REMARK, text, MODEL, next(iter(amplitudes)), cases=count))
     return found
 
 
-def _of_still(six: Mapping[str, Array], frequency: bool) -> list[Remark]:
+def _of_still(six: Mapping[str, Array], frequency: bool) -> list[Note]:
     """What is said of legal contacts that are not shaken, by the input that is 0."""
     legal = (six["mu0"] > 0.0) & (six["Fz"] > 0.0) & (six["k"] > 0.0) & (six["v0"] >= 0.0)
     legal &= np.isfinite(six["mu0"]) & np.isfinite(six["Fz"]) & np.isfinite(six["v0"])
-    found: list[Remark] = []
+    found: list[Note] = []
     for name in ("y0", "Fz_amplitude", "omega"):
         still = np.asarray(legal & (six[name] == 0.0))
         if still.any():
             legal &= ~still  # one remark for each case
             word = "f" if name == "omega" and frequency else name
-            found.append(
-                {
-                    "row": MODEL,
-                    "field": word,
-                    "cases": int(np.count_nonzero(still)),
-                    "text": f"{word} = 0: the contact is not shaken, mu_macro is mu0",
-                }
-            )
+            text = f"{word} = 0: the contact is not shaken, mu_macro is mu0"
+            found.append(Note(REMARK, text, MODEL, word, cases=int(np.count_nonzero(still))))
     return found
 
 
@@ -325,7 +298,7 @@ def _stiff_or(case: Mapping[str, float], other: str) -> str:
     return "Fz" if lightness > case[name] / _LARGE[name] else name
 
 
-def _of_rigid(stiffness: float, cases: int = 1) -> Remark:
+def _of_rigid(stiffness: float, cases: int = 1) -> Note:
     """What a rigid contact assumes, with the stiffness that must be far exceeded for it [N/m]; of
     many cases the largest."""
     text = "rigid: the contact does not stretch before it slips"
@@ -334,4 +307,4 @@ def _of_rigid(stiffness: float, cases: int = 1) -> Remark:
             f"; this holds for k far above mu0 Fz / y0 = {stiffness:.3g} N/m, a softer contact has "
             "another friction"
         )
-    return {"row": STIFFNESS, "field": "k", "cases": cases, "text": text}
+    return Note(REMARK, text, STIFFNESS, "k", cases=cases)

@@ -2,7 +2,7 @@
 of."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from mumacro.inputs.columns import to_si
 from mumacro.inputs.oscillation import MOST_HARMONIC
 from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array
+from mumacro.notes import NOTE, Note, texts_of
 from mumacro.results import Result
 
 # shares of the largest sample: what rounding alone leaves of a term, and between equal samples
@@ -32,7 +33,7 @@ class Harmonics(Result):
     terms: tuple[tuple[int, float, float], ...]
     mean: float  #: of the samples
     rms: float  #: of what the mean and the terms leave out
-    notes: tuple[str, ...]  #: what was done to the samples
+    notes: tuple[Note, ...] = field()  #: what was done to the samples
 
     @property
     def columns(self) -> dict[str, Any]:
@@ -48,16 +49,18 @@ class Harmonics(Result):
         """Each term is a dict, as HTTP takes it."""
         names = ("harmonic", "amplitude", "phase")
         terms = [dict(zip(names, term, strict=True)) for term in self.terms]
-        return {"terms": terms, "mean": self.mean, "rms": self.rms, "notes": self.notes}
+        return {
+            "terms": terms,
+            "mean": self.mean,
+            "rms": self.rms,
+            "notes": texts_of(self.notes, NOTE),
+        }
 
     def _heading(self) -> str:
         return f"<Harmonics: {len(self.terms)}, mean {self.mean:.6g}, rms left out {self.rms:.3g}>"
 
     def _shown(self) -> dict[str, Any]:
         return self.columns if self.terms else {}
-
-    def _below(self) -> list[str]:
-        return [*self.notes]
 
 
 def harmonics(samples: Numbers, periods: int = 1, most: int = 20) -> Harmonics:
@@ -119,7 +122,7 @@ def harmonics(samples: Numbers, periods: int = 1, most: int = 20) -> Harmonics:
     if repeats:
         shorter = _spectrum(scaled[:-1], scale, periods, most)
         if not result.rms < _CLEARLY * shorter.rms:
-            result, notes = shorter, [_REPEATED]
+            result, notes = shorter, [Note(NOTE, _REPEATED)]
     return Harmonics(result.terms, result.mean, result.rms, tuple(notes))
 
 

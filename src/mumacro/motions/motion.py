@@ -17,7 +17,7 @@ import numpy as np
 from mumacro import plotting
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ABSENT, columns_of, real
-from mumacro.inputs.doubts import Remark, lines_of, remarks_on_motion
+from mumacro.inputs.doubts import remarks_on_motion
 from mumacro.inputs.fields import BOUNDS, RAD_PER_CYCLE, STIFFNESS
 from mumacro.inputs.kind import kind_of
 from mumacro.inputs.oscillation import read_oscillation
@@ -25,6 +25,7 @@ from mumacro.inputs.signature import Numbers, Oscillation
 from mumacro.kernel.arrays import Array, Bools, common_shape, flat
 from mumacro.kernel.binding import kernels
 from mumacro.kernel.threads import default_threads
+from mumacro.notes import WARNING, Note
 from mumacro.results import Result, Rows, cell
 from mumacro.stopping import current, look
 
@@ -224,28 +225,31 @@ class Motion(Result):
         return {name: getattr(self, name) for name in NUMBERS}
 
     @property
-    def warnings(self) -> list[str]:
-        """What to do where the search gave up before the estimate was below the tolerance."""
+    def notes(self) -> list[Note]:
+        """What to do where the search gave up before the estimate was below the tolerance; and what
+        is doubtful, as of an answer: every amplitude as y0, that of the normal force as
+        Fz_amplitude, and where nothing oscillates."""
+        scenes = self.scenes
+        doubts = remarks_on_motion(
+            scenes.columns,
+            dict(zip(PARTS, scenes.amplitudes, strict=True)),
+            scenes.frequency == "f",
+        )
+        return [*self._gave_up(), *doubts]
+
+    def _gave_up(self) -> list[Note]:
+        """A warning where the error is above the tolerance."""
         c, tolerance = self.scenes.columns, self.scenes.tolerance
         error = np.ravel(self.error_estimate)
         left = error > tolerance * c["mu0"] * (1.0 + 1e-9)
         if not left.any():
             return []
         cases = f" in {np.count_nonzero(left)} of {left.size} cases" if left.size > 1 else ""
-        return [
+        text = (
             f"the search gave up{cases}: the error is about {error[left].max():.1e}, above the "
             f"tolerance {tolerance:g} mu0; try a larger tolerance, fewer harmonics or a faster drag"
-        ]
-
-    @property
-    def remarks(self) -> list[Remark]:
-        """What is doubtful, as of an answer: every amplitude as y0, that of the normal force as
-        Fz_amplitude; and where nothing oscillates."""
-        return remarks_on_motion(
-            self.scenes.columns,
-            dict(zip(PARTS, self.scenes.amplitudes, strict=True)),
-            self.scenes.frequency == "f",
         )
+        return [Note(WARNING, text)]
 
     def _members(self) -> dict[str, Any]:
         said = {name: said for name in ("warnings", "remarks") if (said := getattr(self, name))}
@@ -262,9 +266,6 @@ class Motion(Result):
 
     def _rows(self) -> Rows | None:
         return None if np.shape(self.mu_macro) else []
-
-    def _below(self) -> list[str]:
-        return [*self.warnings, *lines_of(self.remarks)]
 
     def _in_full(self) -> tuple[str, Rows | None, list[str]]:
         """Of one case a number a row with unit and meaning."""

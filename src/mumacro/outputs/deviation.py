@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from mumacro.inputs.cases import ALL_FIELDS
-from mumacro.inputs.doubts import Remark
 from mumacro.inputs.fields import POSITIVE
+from mumacro.notes import REMARK, Note
 from mumacro.outputs.entry import Member, Output, Values
 from mumacro.outputs.evaluated import Evaluated, where
 from mumacro.outputs.gradient import slopes
@@ -37,7 +37,7 @@ def std(cases: Evaluated) -> Values:
     }
 
 
-def bent(cases: Evaluated, total: float) -> list[Remark]:
+def bent(cases: Evaluated, total: float) -> list[Note]:
     """Remarks on one case: the inputs along which first order is not enough, since mu_macro one
     deviation up or down differs from the slope's by more than a fifth of the whole deviation."""
     spreads = {name: x for name, x in cases.cases.std.items() if x and cases.columns[name] < np.inf}
@@ -50,7 +50,7 @@ def bent(cases: Evaluated, total: float) -> list[Remark]:
         moved[name][2 * i : 2 * i + 2] += spread, -spread
     many = np.asarray(cases.beside(moved, 2 * len(spreads)).mu_macro)
     mu = many.reshape(-1, 2) - cases.mu_macro
-    remarks: list[Remark] = []
+    remarks: list[Note] = []
     for (name, spread), (up, down) in zip(spreads.items(), mu.tolist(), strict=True):
         straight = cases.gradient[name] * spread
         if np.isnan(down):
@@ -63,7 +63,7 @@ def bent(cases: Evaluated, total: float) -> list[Remark]:
             )
         else:
             continue
-        remarks.append({"row": "std", "field": name, "cases": 1, "text": text})
+        remarks.append(Note(REMARK, text, "std", name))
     return remarks
 
 

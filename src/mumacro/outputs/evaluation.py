@@ -137,7 +137,7 @@ def _of_one(case: Evaluated, outputs: tuple[Output, ...]) -> Answer[float]:
     if GRADIENT in outputs:
         answer.gradient, answer.gradient_bound = case.gradient, case.gradient_bound
     if STD in outputs:
-        answer.remarks_on_outputs = bent(case, answer.outputs["std"])
+        answer.notes_on_outputs = bent(case, answer.outputs["std"])
     return answer
 
 

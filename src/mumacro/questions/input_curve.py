@@ -58,6 +58,15 @@ class InputCurve:
         k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
         return Cases.of({**self.case, **k, self.unknown: x, **others}, self.kind, strict)
 
+    def groups(self, x: float) -> tuple[float, float]:
+        """v~ and y~ at one value of the input, from the inputs alone."""
+        c = self.cases(x, True).columns
+        swing = c[AMPLITUDE] / c["Fz"] if self.kind.normal else None
+        with np.errstate(all="ignore"):
+            stiffness = np.float64(c["k"]) / (c["mu0"] * c["Fz"])
+            y = c["y0"] * stiffness if swing is None else swing
+            return float(c["v0"] / np.float64(c["omega"]) * stiffness), float(y)
+
     def mu(self, x: Array) -> Array:
         """mu_macro [-] at ``x`` (n,)."""
         return np.asarray(self.answer(x).mu_macro)

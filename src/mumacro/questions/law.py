@@ -18,11 +18,13 @@ from mumacro.inputs.columns import is_column, to_si
 from mumacro.inputs.fields import ENDS, NAMES, POSITIVE, QUANTITY_OF, field_of, unit_of
 from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
 from mumacro.kernel.arrays import Array
+from mumacro.notes import Note
 from mumacro.outputs.evaluation import chosen
 from mumacro.questions.borders import Crossing, border_crossings
 from mumacro.questions.input_curve import InputCurve
 from mumacro.results import Result
 from mumacro.surrogate import Surrogate
+from mumacro.validity import digits, effect_of, load_notes
 
 SCALES = ("log", "linear")
 
@@ -85,16 +87,28 @@ class Law(Result):
         columns = {name: x for name, x in self.columns.items() if name != self.along}
         border = [{"value": mark.value, "mu_macro": mark.mu_macro} for mark in self.border]
         members = {"along": self.along, "unit": unit_of(self.along), "values": self.values}
-        return {**members, **columns, "border": border}
+        model = {"model": [note.as_row for note in self.notes]} if self.notes else {}
+        return {**members, **columns, "border": border, **model}
 
     def _heading(self) -> str:
         unit, kind = unit_of(self.along), ", ".join(self.kind.names.values())
         low, high = self.values[0], self.values[-1]
         return f"<Law over {self.along} from {low:.6g} to {high:.6g} {unit}: {kind}>"
 
+    @property
+    def digits(self) -> int:
+        """The digits that k supports, at the middle value."""
+        return digits(effect_of(self.answer, place=self.values.size // 2))
+
+    @property
+    def notes(self) -> list[Note]:
+        """On k, where Fz is swept."""
+        return load_notes(self.along, self.case, self.kind.names["contact"], self.stiffening)
+
     def _below(self) -> list[str]:
         unit = unit_of(self.along)
-        return [f"{mark.name} at {self.along} = {mark.value:.6g} {unit}" for mark in self.border]
+        marks = [f"{mark.name} at {self.along} = {mark.value:.6g} {unit}" for mark in self.border]
+        return [*marks, *super()._below()]
 
     def plot(
         self, ax: Any = None, *, roots_of: Mapping[float, Iterable[float]] = MappingProxyType({})

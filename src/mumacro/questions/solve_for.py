@@ -45,11 +45,13 @@ from mumacro.inputs.fields import ENDS, POSITIVE, QUANTITY_OF, field_of
 from mumacro.inputs.kind import AMPLITUDE, kind_of
 from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array
+from mumacro.notes import Note
 from mumacro.questions.input_curve import EVERYWHERE, InputCurve
 from mumacro.questions.law import law
 from mumacro.questions.search import TINY, Search, samples
 from mumacro.questions.solutions import Reach, Solution
 from mumacro.surrogate import Surrogate
+from mumacro.validity import digits, effect_of_groups, load_notes
 
 HUGE = 1.7976931348623157e308
 _DRAWN = 400  # points of a curve in a picture
@@ -95,7 +97,26 @@ class TableSolution(Solution):
         """Return what every solution has; ``ends`` have the answers of the softest and the stiffest
         contact of an interval of k."""
         ends = {"ends": [end._answers() for end in self.ends]} if self.ends else {}
-        return {**super()._members(), **ends}
+        model = {"model": [note.as_row for note in self.notes]} if self.notes else {}
+        return {**super()._members(), **ends, **model}
+
+    @property
+    def digits(self) -> int:
+        """The digits that k supports, at the first root."""
+        first = next((root for roots in self.roots for root in roots), None)
+        if self.curve is None or first is None:
+            return digits(0.0)
+        curve = self.curve
+        v, y = curve.groups(field_of(self.unknown)[1] * first.value)
+        return digits(effect_of_groups(curve.surrogate.tabulated, curve.kind, v, y))
+
+    @property
+    def notes(self) -> list[Note]:
+        """On k, where Fz is solved for."""
+        if self.curve is None:
+            return []
+        contact = self.curve.kind.names["contact"]
+        return load_notes(self.unknown, self.curve.case, contact, self.stiffening)
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the law over the unknown with the targets and their roots, over the range that was
@@ -140,7 +161,7 @@ class TableSolution(Solution):
             for word, end in ends
             for root in end.roots[0]
         ]
-        return [*of_ends, *super()._below()][:4]
+        return [*[*of_ends, *super()._below()][:4], *(note.line for note in self.notes)]
 
 
 def _around(roots: Sequence[float]) -> tuple[float, float]:

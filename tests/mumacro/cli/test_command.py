@@ -21,7 +21,7 @@ from mumacro.inputs.case import read_one
 from mumacro.inputs.fields import ENDS, NAMES, SI
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.units import UNITS_OF, scale_of, split_unit
-from mumacro.validity import model_rows
+from mumacro.validity import rows_of
 from tests.support.cases import Capture, Case
 from tests.support.comparing import close
 
@@ -55,14 +55,12 @@ def test_one_case_is_answered_with_units_regime_bound_and_source(
         assert part in text
     _, shown, *rows = output_of(capsys, 0, CASE).splitlines()  # k to 10 % supports four digits
     assert shown.split()[:2] == ["mu_macro", f"{expected.mu_macro:#.4g}"]
-    assumptions = [f"assumes  {row['row']}: {row['text']}" for row in model_rows(surrogate, VALUES)]
+    assumptions = [f"assumes  {row['row']}: {row['text']}" for row in rows_of(expected)]
     assumptions = [line.replace("k as an interval", "k=0.9..1.1N/um") for line in assumptions]
     assert rows[-len(assumptions) - 1 : -1] == assumptions
     interval = output_of(capsys, 0, CASE.replace("k=1e6", "k=0.9..1.1N/um")).splitlines()[1]
     assert " to " in interval.partition("[-]")[0]
-    assert json.loads(output_of(capsys, 0, CASE, "--json", "--model"))["model"] == model_rows(
-        surrogate, VALUES
-    )
+    assert json.loads(output_of(capsys, 0, CASE, "--json", "--model"))["model"] == rows_of(expected)
     assert "model" not in json.loads(output_of(capsys, 0, CASE, "--json"))
 
 

@@ -19,7 +19,7 @@ from mumacro.contacts.stiffening import Stiffening
 from mumacro.questions.borders import border_crossings
 from mumacro.questions.law import law as friction_law
 from mumacro.questions.solve_for import solve_for
-from mumacro.validity import load_rows
+from mumacro.validity import load_notes
 from tests.support.cases import CASE, PAIRS, Case, as_kind, without
 from tests.support.comparing import close
 from tests.support.refusals import refused
@@ -278,15 +278,17 @@ def test_borders_of_proportional_growth_are_none(surrogate: Surrogate) -> None:
 
 def test_the_model_line_says_whether_k_grows() -> None:
     five = without(CASE, "Fz")
-    (row,) = load_rows("Fz", five)
-    assert "constant over Fz" in row["text"]
-    assert "and a stiffness exponent" in row["text"]
-    (row,) = load_rows("Fz", five, "ball")
-    assert "stiffness exponent" not in row["text"]
-    (row,) = load_rows("Fz", five, "ball", Stiffening(1.0 / 3.0, 10.0))
-    assert row["text"] == "k grows as Fz^0.333 from its value at Fz = 10 N"
-    assert load_rows("v0", without(CASE, "v0")) == []
-    assert load_rows("Fz", {**five, "k": "rigid"}) == load_rows("Fz", {**five, "k": math.inf}) == []
+    (row,) = load_notes("Fz", five)
+    assert "constant over Fz" in row.text
+    assert "and a stiffness exponent" in row.text
+    (row,) = load_notes("Fz", five, "ball")
+    assert "stiffness exponent" not in row.text
+    (row,) = load_notes("Fz", five, "ball", Stiffening(1.0 / 3.0, 10.0))
+    assert row.text == "k grows as Fz^0.333 from its value at Fz = 10 N"
+    assert load_notes("v0", without(CASE, "v0")) == []
+    assert (
+        load_notes("Fz", {**five, "k": "rigid"}) == load_notes("Fz", {**five, "k": math.inf}) == []
+    )
 
 
 WORDS = "mu0=0.3 Fz=10N k=1N/um y0=2um omega=1.3e5 v0=1cm/s"

@@ -154,7 +154,7 @@ def test_weights_are_the_standard_deviations(surrogate: Surrogate) -> None:
     mu[3], std[3] = 0.9, 1e6
     estimate = fit({"v0": V0, "mu_macro": mu, "std": std}, **RIG)
     assert estimate.values["k"] == close(1e6, rel=2e-3)
-    assert estimate.warnings == ()
+    assert estimate.warnings == []
     assert any(
         "scatter by more than their std" in text
         for text in fit({"v0": V0, "mu_macro": mu, "std": 1e-5}, **RIG).warnings
@@ -232,7 +232,7 @@ def test_an_input_in_a_wrong_unit_is_remarked_on(surrogate: Surrogate) -> None:
 
 def test_friction_that_looks_like_per_cent_is_remarked_on(surrogate: Surrogate) -> None:
     mu = friction(surrogate, v0=V0)
-    assert fit({"v0": V0, "mu_macro": mu}, **RIG).remarks == ()
+    assert fit({"v0": V0, "mu_macro": mu}, **RIG).remarks == []
     [remark] = fit({"v0": V0, "mu_macro": 100.0 * mu}, **RIG).remarks
     assert (remark["row"], remark["field"], remark["cases"]) == ("units", "mu_macro", 20)
     assert "mu_macro [%]" in remark["text"]

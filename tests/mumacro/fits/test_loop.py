@@ -126,7 +126,7 @@ def test_less_than_a_cycle_begins_with_the_measured_force() -> None:
     found = fit_loop(x, np.minimum(1.0 + K * x, 3.0), FZ)
     assert found.values == close({"k": K, "mu0": MU0}, rel=1e-9)
     assert math.isnan(found.energy)
-    assert any("less than one cycle" in note for note in found.notes)
+    assert any("less than one cycle" in note.text for note in found.notes)
     with refused("displacement"):
         fit_loop(x, np.minimum(K * x, 3.0), FZ, "ball")
 
@@ -137,14 +137,14 @@ def test_the_other_sign_of_the_force_is_turned_and_noted(contact: str) -> None:
     force = forces(contact, x) + noise(x)
     plain, turned = fit_loop(x, force, FZ, contact), fit_loop(x, -force, FZ, contact)
     assert turned.values["k"] == close(plain.values["k"], rel=1e-12)
-    assert [note for note in turned.notes if "sign" in note]
-    assert not [note for note in plain.notes if "sign" in note]
+    assert [note for note in turned.notes if "sign" in note.text]
+    assert not [note for note in plain.notes if "sign" in note.text]
 
 
 def test_a_first_cycle_from_rest_is_noted() -> None:
     x = sine(200, 1.0)
     notes = [fit_loop(x, forces("spring", x, before=n) + noise(x), FZ).notes for n in (0, 200)]
-    assert any("from rest" in note for note in notes[0])
+    assert any("from rest" in note.text for note in notes[0])
     assert notes[1] == ()
 
 
@@ -174,7 +174,7 @@ def test_intervals_of_noisy_loops_hold_the_truth(loops: int) -> None:
     low, high = (binom.ppf(level, loops, 0.95) for level in (0.0005, 0.9995))
     for name in ("k", "mu0"):
         assert low <= sum(one[name] for one in results) <= high
-    notes = [note for one in results for note in one["notes"] if "bound" not in note]
+    notes = [note for one in results for note in one["notes"] if "bound" not in note.text]
     assert len(notes) <= 4
 
 
@@ -203,7 +203,7 @@ def test_a_loop_that_never_slips_bounds_mu0_from_below() -> None:
     assert found.interval["mu0"][0] == close(0.2, rel=0.03)
     assert found.interval["mu0"][1] == math.inf
     assert found.interval["k"][0] < K < found.interval["k"][1]
-    assert any("lower bound" in note for note in found.notes)
+    assert any("lower bound" in note.text for note in found.notes)
     assert json.loads(json.dumps(found.to_dict()))["interval"]["mu0"][1] is None
 
 
@@ -213,7 +213,7 @@ def test_a_loop_that_never_sticks_leaves_k_open() -> None:
     assert found.interval["k"][0] < min(found.values["k"], 1e10)
     assert found.interval["k"][1] == math.inf
     assert found.values["mu0"] == close(MU0, rel=0.01)
-    assert any("k has only" in note for note in found.notes)
+    assert any("k has only" in note.text for note in found.notes)
 
 
 def of_two_stiffnesses(x: Array, up: float, down: float) -> Array:
@@ -235,7 +235,7 @@ def test_what_speaks_against_the_model_is_noted() -> None:
     }
     for word, force in loops.items():
         notes = fit_loop(x, force + noise(x, size=0.01), FZ).notes
-        assert any(word in note for note in notes), (word, notes)
+        assert any(word in note.text for note in notes), (word, notes)
     assert fit_loop(x, plain + noise(x, size=0.01), FZ).notes == ()
 
 

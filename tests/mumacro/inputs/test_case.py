@@ -253,10 +253,10 @@ def test_what_is_unusual_is_remarked_on_for_one_case_and_in_columns(
     name: str, value: float
 ) -> None:
     [one] = remarks({**CASE, name: value})
-    assert (one["row"], one["field"], one["cases"]) == ("units", name, 1)
+    assert (one.row, one.field, one.cases) == ("units", name, 1)
     column = np.array([CASE[name], value, math.nan, value])
     [many] = remarks({**CASE, name: column})
-    assert (many["row"], many["field"], many["cases"]) == ("units", name, 2)
+    assert (many.row, many.field, many.cases) == ("units", name, 2)
 
 
 def test_usual_cases_zero_and_gaps_are_not_doubted() -> None:
@@ -265,14 +265,14 @@ def test_usual_cases_zero_and_gaps_are_not_doubted() -> None:
         expected = [] if name == "v0" else [("model", name, 1)]
         for value in (0.0, np.array([0.0, CASE[name], math.nan])):
             found = remarks({**CASE, name: value})
-            assert [(one["row"], one["field"], one["cases"]) for one in found] == expected
+            assert [(one.row, one.field, one.cases) for one in found] == expected
     assert remarks({name: np.zeros(0) for name in CASE}) == []
 
 
 def test_a_rigid_contact_is_told_what_it_assumes() -> None:
     [remark] = remarks({**CASE, "k": math.inf})
-    assert (remark["row"], remark["field"]) == ("k is known", "k")
-    assert "1.5e+06 N/m" in remark["text"]
+    assert (remark.row, remark.field) == ("k is known", "k")
+    assert "1.5e+06 N/m" in remark.text
 
 
 @pytest.mark.parametrize("k", [math.inf, 0.5, 1e6, 2e12])
@@ -291,4 +291,4 @@ def test_one_case_has_the_remarks_of_a_column_of_one(
 def test_what_is_not_legal_is_refused_and_not_doubted(name: str, value: float) -> None:
     found = remarks({**CASE, name: np.array([CASE[name], value])})
     still = value == 0.0 and name in ("y0", "omega")  # legal, and it needs no model
-    assert [one["row"] for one in found] == ["model"] * still
+    assert [one.row for one in found] == ["model"] * still

@@ -73,7 +73,7 @@ def test_a_repeated_end_point_is_left_out_and_noted(periods: int) -> None:
     closed = harmonics(np.append(samples, samples[0]), periods, 9)
     assert np.array(closed.terms) == close(np.array(plain.terms), rel=1e-12)
     (note,) = closed.notes
-    assert "repeats the first" in note
+    assert "repeats the first" in note.text
 
 
 def test_a_triangle_from_peak_to_peak_repeats_its_end_point() -> None:
