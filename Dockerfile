@@ -66,9 +66,7 @@ LABEL org.opencontainers.image.title="mumacro" \
       org.opencontainers.image.vendor="The mumacro developers"
 COPY --from=build /app /app
 WORKDIR /app
-# Two heaps in place of one for each of sixteen threads: what a large batch frees is used again.
-ENV MALLOC_ARENA_MAX=2 \
-    PATH=/app/venv/bin:$PATH \
+ENV PATH=/app/venv/bin:$PATH \
     PYTHONPATH=/app/src:/app \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
