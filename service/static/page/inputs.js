@@ -4,13 +4,24 @@ import { dials } from "./dials.js";
 import { $, attribute, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { inputsOf } from "./state.js";
-import { about, around, inUnit, numberOf, pageOf, prose, typeset, unitAt, withUnit } from "./words.js";
+import {
+  about,
+  around,
+  inUnit,
+  numberOf,
+  pageOf,
+  prose,
+  typeset,
+  unitAt,
+  withUnit,
+} from "./words.js";
 
 /** Of an input, by one press of an arrow key; with Shift. */
 const [STEP, FINE_STEP] = [1.05, 1.005];
 
 /** What can be done with a label. */
-const HOW = "Drag it sideways: 1 pixel is 1 %. Arrow up and down in the field: 5 %, with Shift 0.5 %";
+const HOW =
+  "Drag it sideways: 1 pixel is 1 %. Arrow up and down in the field: 5 %, with Shift 0.5 %";
 
 /** A choice of a few words, as a row of buttons of which one is pressed in. */
 export function choice(store, name, words, reasons = {}) {
@@ -70,7 +81,9 @@ export function inputsPanel(store, moved) {
           title=${`${meaning}${movable ? `. ${HOW}` : ""}`}
         >
           ${typeset(symbol)}
-          <span class="label">${label}<small>${name === typing ? "Enter takes it" : note}</small></span>
+          <span class="label"
+            >${label}<small>${name === typing ? "Enter takes it" : note}</small></span
+          >
         </label>
         <input
           id=${`field-${name}`}

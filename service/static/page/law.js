@@ -148,7 +148,13 @@ export function lawPanel(store, moved) {
       );
     }
     const still = plot.y(law.mu_static[0]);
-    plot.text("static µ", box.x + 10, Math.min(still + 14, box.y + box.height - 6), "note", "start");
+    plot.text(
+      "static µ",
+      box.x + 10,
+      Math.min(still + 14, box.y + box.height - 6),
+      "note",
+      "start",
+    );
   }
 
   /** The line of the target and the user's point. */
@@ -229,7 +235,16 @@ export function lawPanel(store, moved) {
 
   /** All that is drawn, as CSV (RFC 4180), in the units that are shown. */
   function csv() {
-    const { values, k, mu_macro, mu_static, regime, mu_macro_low: low, mu_macro_high: high, std } = law;
+    const {
+      values,
+      k,
+      mu_macro,
+      mu_static,
+      regime,
+      mu_macro_low: low,
+      mu_macro_high: high,
+      std,
+    } = law;
     const columns = {
       [heading()]: values.map((value) => Number(toUnit(law.along, value, unit()).toPrecision(15))),
       ...(k && { "k [N/m]": k }),

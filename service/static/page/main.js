@@ -106,7 +106,8 @@ function start(names) {
   panels = { inputs: inputsPanel(store, moved), number: numberPanel(store) };
   show();
   $("version").textContent = about.version;
-  for (const link of document.querySelectorAll("[data-page]")) link.href = pageOf(link.dataset.page);
+  for (const link of document.querySelectorAll("[data-page]"))
+    link.href = pageOf(link.dataset.page);
   const unknown = store.unknown.join(", ");
   $("notice").hidden = !unknown;
   $("notice-text").textContent = unknown

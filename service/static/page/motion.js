@@ -194,7 +194,8 @@ export function motionPanel(store, moved) {
     if (motion) numbers();
     $("motion-meanings").hidden = !motion;
     render(roots(), $("motion-roots"));
-    const atFields = faults.size && [...faults.keys()].every((name) => Object.hasOwn(PARTS, name.split(",")[0]));
+    const atFields =
+      faults.size && [...faults.keys()].every((name) => Object.hasOwn(PARTS, name.split(",")[0]));
     write("motion-status", refused && !atFields ? prose(refused) : "");
     const remarks = (motion?.remarks ?? []).filter((one) => !isDoubt(one));
     const all = [withoutDeviations(), ...remarks.map(({ text }) => prose(text))].filter(Boolean);

@@ -42,7 +42,7 @@ export function headline(answer, all) {
   return { value, std: deviation };
 }
 
-/** The number in one line of a phone: with the regime, where it has no deviation and no interval. */
+/** The number in one line of a phone; the regime has room beside a value alone. */
 function shortOf(answer) {
   const { value, std } = headline(answer, false);
   if (std) return `µ = ${value} ± ${std}`;
@@ -76,8 +76,14 @@ const DOUBTS = ["first order", "std"];
  * its line of advice.
  */
 function sayings(answer) {
-  const { remarks = [], model = [], inputs, mu_macro: mu, mu_macro_low: low, mu_macro_high: high } =
-    answer;
+  const {
+    remarks = [],
+    model = [],
+    inputs,
+    mu_macro: mu,
+    mu_macro_low: low,
+    mu_macro_high: high,
+  } = answer;
   const said = new Set(remarks.map(({ row }) => row));
   const named = {
     std: "standard deviation",
