@@ -47,7 +47,7 @@ def written(folder: Path, n: int) -> dict[str, Path]:
     return {**paths, "Parquet": folder / "cases.parquet"}
 
 
-def by_pyarrow(source: Path, out: Path, surrogate: Surrogate, decimal: str) -> None:
+def by_pyarrow(source: Path, out: Path, surrogate: Surrogate, decimal: str) -> Path:
     """Read, evaluate and write with what a person would write who knows the layout."""
     if source.suffix == ".parquet":
         table = pa.parquet.read_table(source, use_threads=False)
@@ -69,6 +69,7 @@ def by_pyarrow(source: Path, out: Path, surrogate: Surrogate, decimal: str) -> N
         pa.parquet.write_table(table, out)
     else:
         pa.csv.write_csv(table, out)
+    return out
 
 
 def files(cases: float) -> str:
