@@ -174,8 +174,7 @@ class TextSource:
         for path in files:
             try:
                 table = TextTable(path, column_names, dialect)
-                if (rows := next(table.rows(), None)) is not None:
-                    table.see_signs(rows)
+                table.find_signs()
             except TextError as error:
                 raise FilesError(f"{path}: {error}") from None
             self.tables.append(table)

@@ -80,9 +80,13 @@ _MAY_BE_OTHERWISE = np.array(
     ]
 )
 _END, _QUOTE = ord("\n"), ord('"')
-# a quoted cell, and a quote that begins a cell, by the separator; blanks may stand before
+# by the separator: a quoted cell, one with blanks before it, and a quote that begins a cell
 _QUOTED = {
-    sep: re.compile(rb'(?<![^%b\n]) *+("(?:[^"]++|"")*+")(?=[%b\n])' % (sep.encode(), sep.encode()))
+    sep: re.compile(rb'"(?<![^%b\n]")(?:[^"]++|"")*+"(?=[%b\n])' % (sep.encode(), sep.encode()))
+    for sep in ",;|\t"
+}
+_BEHIND_BLANKS = {
+    sep: re.compile(rb'(?<![^%b\n]) ++("(?:[^"]++|"")*+"(?=[%b\n]))' % (sep.encode(), sep.encode()))
     for sep in ",;|\t"
 }
 _OPEN_QUOTE = {sep: re.compile(rb'(?<![^%b\n]) *+"' % sep.encode()) for sep in ",;|\t"}
@@ -369,11 +373,10 @@ def _without_quotes(first: int, data: bytes, sep: str) -> tuple[bytes, bytes, st
     not closed; TextError where a quote is not at the end of its cell."""
     if b'"' not in data:
         return data, data, ""
-    quoted, open_quote = _QUOTED[sep], _OPEN_QUOTE[sep]
     if b' "' in data:
-        data = quoted.sub(rb"\1", data)
-    bare = quoted.sub(lambda match: b"0" * len(match[0]), data)
-    for match in open_quote.finditer(bare):
+        data = _BEHIND_BLANKS[sep].sub(rb"\1", data)
+    bare = _QUOTED[sep].sub(lambda match: b"0" * len(match[0]), data)
+    for match in _OPEN_QUOTE[sep].finditer(bare) if b'"' in bare else ():
         start = bare.rfind(b"\n", 0, match.start()) + 1
         if is_comment(data[start : start + 100].decode(errors="ignore")):
             continue
@@ -552,13 +555,27 @@ class TextTable:
         """How the table was read, once it is."""
         return self._said + self.layout.described(self.signs) + again(self.account.repeated)
 
-    def rows(self, report_place: Callable[[int], None] = lambda _at: None) -> Iterator[Rows]:
-        """Yield the rows in pieces; ``report_place`` is told how far a file is read."""
+    def find_signs(self) -> None:
+        """Look for the signs of numbers in the first rows, and then in the first piece."""
+        for last in (self.layout.first + _AT_ONCE, None):
+            rows = None if self.signs.decimal else next(self.rows(last=last), None)
+            if rows is not None:
+                self.see_signs(rows)
+
+    def rows(
+        self,
+        report_place: Callable[[int], None] = lambda _at: None,
+        last: int | None = None,
+    ) -> Iterator[Rows]:
+        """Yield the rows in pieces, down to the line ``last``; ``report_place`` is told how far a
+        file is read."""
         self.account = Account(self.layout, self._column_names)
         rest, behind = "", self.layout.first
+        ends = [line for line in (last, self.layout.last) if line is not None]
+        end = min(ends, default=None)
         for piece in self._text(report_place):
             self._check(piece)
-            first, text = _between(piece, self.layout.first, self.layout.last)
+            first, text = _between(piece, self.layout.first, end)
             if text is None:
                 continue
             if rest:
