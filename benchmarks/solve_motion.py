@@ -23,6 +23,8 @@ from mumacro.plotting import INK, Panels, head, save
 PROBLEMS, FINE = 1000, 2000
 POSSIBLE = [name for name in UNKNOWNS if name != "omega"]
 CONVEYOR: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e5, "f": 50.0, "x": 1e-4}
+BALL: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "x": 2e-6, "y": 1e-6}
+BALL["contact"] = "ball"
 PHASES = np.linspace(0.0, 360.0, 73)
 
 
@@ -92,22 +94,23 @@ def search(share: float = 1.0) -> str:
 
 
 def times(share: float = 1.0) -> str:
-    """Of one transport speed, and of 1,000 targets of one motion."""
+    """Of one transport speed, and of 1,000 targets of one motion of a spring and of a ball."""
     conveyor = {**CONVEYOR, "normal": (8.0, -90.0)}
     targets = np.linspace(-0.1, 0.29, max(round(share * PROBLEMS), 1))
 
-    def spent(target: Any) -> tuple[float, float, int]:
+    def spent(target: Any, case: dict[str, Any] = conveyor) -> tuple[float, float, int]:
         elapsed, processor = time.perf_counter(), time.process_time()
-        solution = mumacro.solve_motion("v0", target, **conveyor)
+        solution = mumacro.solve_motion("v0", target, **case)
         number = sum(map(len, solution.roots))
         return time.perf_counter() - elapsed, time.process_time() - processor, number
 
     one = min(spent(0.0) for _ in range(7))
     many = spent(targets)
+    balls = spent(np.linspace(0.11, 0.28, targets.size), BALL)
     return (
         f"One transport speed: {1e3 * one[0]:.0f} ms, {1e3 * one[1]:.0f} ms of processor time.\n"
         f"{targets.size} targets, {many[2]} roots: {many[0]:.1f} s, {many[1]:.1f} s of processor "
-        "time."
+        f"time; of a ball, {balls[2]} roots: {balls[0]:.1f} s, {balls[1]:.1f} s of processor time."
     )
 
 
