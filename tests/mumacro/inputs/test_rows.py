@@ -89,4 +89,4 @@ CASE = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01
 )
 def test_a_case_gets_one_remark(changed: dict[str, float], row: str) -> None:
     assert remarks(CASE) == []
-    assert [one["row"] for one in remarks({**CASE, **changed})] == [row]
+    assert [one.row for one in remarks({**CASE, **changed})] == [row]
