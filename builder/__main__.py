@@ -161,7 +161,7 @@ def _export(options: Namespace) -> str:
 
 
 def _report(options: Namespace, members: dict[str, Any]) -> str:
-    """What was written, as JSON or in columns, as ``mumacro table``."""
+    """Return what was written, as JSON or in columns, as ``mumacro table``."""
     if options.json:
         return as_json(members)
     return in_columns([(name, _text(value)) for name, value in members.items()])
@@ -184,7 +184,7 @@ def _figures(options: Namespace) -> str:
 
 
 def _whole(low: int, high: float = math.inf) -> Callable[[str], int]:
-    """The type of an argument: a whole number within bounds."""
+    """Return the type of an argument: a whole number within bounds."""
 
     def number(text: str) -> int:
         if text.isdecimal() and low <= int(text) <= high:

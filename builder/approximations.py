@@ -60,8 +60,8 @@ _FORMULAS = {
 
 
 def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
-    """The approximations of :data:`APPROXIMATIONS` along a law [-], (n,); NaN outside the stated
-    range.
+    """Return the approximations of :data:`APPROXIMATIONS` along a law [-], (n,); NaN outside the
+    stated range.
 
     InputError for a ball, and an oscillation along or normal: the article has one spring, across.
     """
@@ -110,8 +110,8 @@ def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
 
 
 def approximate_borders(y: Array) -> dict[str, Array]:
-    """v~crit(y~) [-] by the formulas of :data:`BORDERS`, each an array like ``y``; NaN outside the
-    stated range.
+    """Return v~crit(y~) [-] by the formulas of :data:`BORDERS`, each an array like ``y``; NaN
+    outside the stated range.
 
     >>> crit = approximate_borders(np.array([0.5, 2.0]))
     >>> crit["eq_24"].round(4).tolist(), crit["eq_26"].round(4).tolist()
@@ -125,7 +125,7 @@ def approximate_borders(y: Array) -> dict[str, Array]:
 
 
 def _spring_inputs(law: Law) -> dict[str, Any]:
-    """The inputs of a law of one spring across."""
+    """Return the inputs of a law of one spring across."""
     if law.kind != SPRING:
         kind_names = " ".join(law.kind.names.values())
         raise InputError(
@@ -135,7 +135,7 @@ def _spring_inputs(law: Law) -> dict[str, Any]:
 
 
 def border_speeds(surrogate: Surrogate, law: Law) -> dict[str, Array]:
-    """v0 [m/s] at which continuous sliding begins, for each case of a law, exact and as in
+    """Return v0 [m/s] at which continuous sliding begins, for each case of a law, exact and as in
     :data:`BORDERS`; (n,).
 
     NaN where an approximation does not apply and where y~ is beyond double range; 0 for rigid

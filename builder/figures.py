@@ -63,12 +63,12 @@ class Panel(NamedTuple):
 
 
 def _solve_border(y: NDArray[Any]) -> Array:
-    """v~crit and mu~ there at each amplitude (2, n), each a solve of the full model."""
+    """Return v~crit and mu~ there at each amplitude (2, n), each a solve of the full model."""
     return np.array([border(float(value)) for value in y]).T
 
 
 def steady_cycle(v: float, y: float, steps: int = 2000) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """The steady cycle at v~ = ``v``, y~ = ``y`` [-], by :func:`mumacro.motion`.
+    """Return the steady cycle at v~ = ``v``, y~ = ``y`` [-], by :func:`mumacro.motion`.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def steady_cycle(v: float, y: float, steps: int = 2000) -> tuple[Array, Array, N
 
 
 def _cycle(_: Surrogate) -> list[Panel]:
-    """One cycle of each regime: the force in the friction circle, and its components."""
+    """Return one cycle of each regime: the force in the friction circle, and its components."""
     discs, traces, turn = [], [], np.linspace(0.0, 2.0 * np.pi, 361)
     for (v, y), title in CASES.items():
         tau, u, sticks = steady_cycle(v, y)

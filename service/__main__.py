@@ -78,7 +78,7 @@ def main(arguments: Sequence[str] | None = None, prog: str = "python -m service"
 
 
 def _address(settings: Settings) -> str:
-    """Where this machine reaches the service."""
+    """Return where this machine reaches the service."""
     any_address = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # noqa: S104  (compared, never bound)
     host = any_address.get(settings.host, settings.host)
     return f"http://{f'[{host}]' if ':' in host else host}:{settings.port}"
@@ -102,7 +102,7 @@ def _announce(settings: Settings) -> None:
 
 
 def _is_taken(settings: Settings) -> bool:
-    """Whether another program listens at the address."""
+    """Return whether another program listens at the address."""
     if not settings.port:  # any free one
         return False
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET

@@ -131,7 +131,7 @@ class Admission:
         self._last = client, asyncio.get_running_loop().time()
 
     def _share(self, client: str, whole: int) -> int:
-        """What one client may have of a whole."""
+        """Return what one client may have of a whole."""
         _, at = self._before if self._last[0] == client else self._last
         is_alone = asyncio.get_running_loop().time() - at > _RECENTLY_S
         return max(1, whole - max(1, whole // 8) if is_alone else whole // 2)
@@ -210,8 +210,8 @@ class Admission:
             one.admitted.set_result(None)
 
     def _overloaded(self, detail: str) -> RequestError:
-        """The refusal with the time after which there will be room: what is waiting and running has
-        ended then, if it takes as long as the last computations."""
+        """Return the refusal with the time after which there will be room: what is waiting and
+        running has ended then, if it takes as long as the last computations."""
         self.refused += 1
         rounds = 1 + len(self.queue) / self.settings.max_computations
         seconds = min(max(1, math.ceil(rounds * self._seconds)), self.settings.compute_limit_s)
@@ -312,7 +312,8 @@ async def _gone(receive: Receive) -> None:
 
 
 def client_of(scope: Scope) -> str:
-    """Who asks: the holder of a key, else an address, of IPv6 the network that one site has."""
+    """Return who asks: the holder of a key, else an address, of IPv6 the network that one site
+    has."""
     if holder := scope.get("key_holder"):
         return f"key {holder}"
     address = str((scope.get("client") or ("",))[0])
@@ -323,7 +324,7 @@ def client_of(scope: Scope) -> str:
 
 
 def ticket_of(scope: Scope) -> Ticket:
-    """The ticket of a request, which :class:`Admitted` takes back."""
+    """Return the ticket of a request, which :class:`Admitted` takes back."""
     ticket: Ticket | None = scope.get(_TICKET)
     if ticket is None:
         ticket = scope[_TICKET] = Ticket(scope)

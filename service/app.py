@@ -181,7 +181,7 @@ class HeadAsGet:
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
-    """The application, whose tables are loaded when it starts; settings are read from the
+    """Return the application, whose tables are loaded when it starts; settings are read from the
     environment if left out."""
     settings = load_settings() if settings is None else settings
     app = Service(
@@ -241,7 +241,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
 
 def _methods_of_paths(app: FastAPI) -> dict[str, str]:
-    """Path -> the methods that it is answered for, as in the header Allow."""
+    """Return path -> the methods that it is answered for, as in the header Allow."""
     methods: dict[str, set[str]] = {}
     for route in app.routes:
         of_path = methods.setdefault(getattr(route, "path", ""), set())
@@ -266,7 +266,7 @@ def _without_default(member: dict[str, Any]) -> None:
 
 
 def _described(app: FastAPI) -> dict[str, Any]:
-    """FastAPI's description, with what it cannot know."""
+    """Return FastAPI's description, with what it cannot know."""
     document: dict[str, Any] = get_openapi(
         title=app.title,
         version=app.version,

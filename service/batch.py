@@ -30,7 +30,7 @@ from .tables import LoadedTable, Tables
 
 
 def body_and_query(members: Mapping[str, Any], options: BatchOptions) -> dict[str, Any]:
-    """What body and query say, each name once."""
+    """Return what body and query say, each name once."""
     query = options.members
     if repeats := [name for name in query if members.get(name) is not None]:
         reason = "is given in the query and in the body"
@@ -57,7 +57,7 @@ class Batch:
     def of(
         cls, body: Body, options: BatchOptions, tables: Tables, max_batch: int, **more: Any
     ) -> "Batch":
-        """The batch of a body, with the options of body and query together."""
+        """Return the batch of a body, with the options of body and query together."""
         lengths = {
             name: len(value)
             for name, value in body.members.items()
@@ -101,7 +101,7 @@ class Batch:
         return self.cases.size * cost(self.outputs, self.cases)
 
     def write(self) -> Iterator[bytes]:
-        """The answer as JSON, piece by piece, in the form of the body."""
+        """Yield the answer as JSON, piece by piece, in the form of the body."""
         yield from (write_rows if self.rows else write_columns)(self._answers())
         end: dict[str, Any] = {"errors": self.errors, "n_errors": self.n_errors}
         if self.notes:
@@ -109,7 +109,7 @@ class Batch:
         yield b"," + dump(end | self.table.signature)[1:]
 
     def _answers(self) -> Iterator[Answer[Any]]:
-        """The answers, slice by slice; one empty slice if there is no case."""
+        """Yield the answers, slice by slice; one empty slice if there is no case."""
         for start in range(0, max(self.cases.size, 1), SLICE):
             part = self.cases.part(slice(start, start + SLICE))
             answer = self.table.surrogate.answer(part, self.outputs)

@@ -47,7 +47,7 @@ class Body(NamedTuple):
 
 
 def too_large(max_batch: int) -> RequestError:
-    """The error for a batch with more cases than the settings allow."""
+    """Return the error for a batch with more cases than the settings allow."""
     return RequestError(
         ProblemKind.BATCH_TOO_LARGE,
         f"a batch may have up to {max_batch} cases, this one has more: {MORE_CASES}",
@@ -56,8 +56,8 @@ def too_large(max_batch: int) -> RequestError:
 
 
 def read(text: bytearray, max_batch: int, words: Mapping[str, Any]) -> Body:
-    """The cases and the options of a body: an object of columns, or a list of rows; ``words`` are
-    contact, direction and deviations, where the query gives them for all rows."""
+    """Return the cases and the options of a body: an object of columns, or a list of rows;
+    ``words`` are contact, direction and deviations, where the query gives them for all rows."""
     most, objects = max_batch + 64, count(text, b"{")
     brackets = count(text, b"[")
     if max(objects, brackets) > most or count(text, b",") > _KNOWN * most:
@@ -89,7 +89,7 @@ def _check_names(columns: Mapping[str, Any], words: Mapping[str, Any]) -> None:
 
 
 def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
-    """Rows one by one: each is checked as one case, and a bad one gets its first reason."""
+    """Return rows one by one: each is checked as one case, and a bad one gets its first reason."""
     columns: dict[str, Any] = {name: np.full(len(rows), np.nan) for name in (*ALL_FIELDS, *ENDS)}
     columns |= {name: np.zeros(len(rows)) for name in DEVIATIONS}
     usual = {name: words.get(name, word) for name, word in SPRING.names.items()}
@@ -136,7 +136,7 @@ def _row(row: Any) -> Case:
 
 
 def _first(error: ValidationError | InputError) -> Reason:
-    """The first fault of a row, in the order of the inputs."""
+    """Return the first fault of a row, in the order of the inputs."""
     if isinstance(error, InputError):
         return (str(error.field) or None), reason_of(error)
     faults = faults_of(error.errors(include_url=False), Case.model_fields)
@@ -150,7 +150,7 @@ def _first(error: ValidationError | InputError) -> Reason:
 
 
 def write_columns(answers: Iterable[Answer[Any]]) -> Iterator[bytes]:
-    """An object of lists, piece by piece, without its closing brace."""
+    """Yield an object of lists, piece by piece, without its closing brace."""
     parts = [*answers]
     yield from _object(nested({path: [part[path] for part in parts] for path in parts[0].paths}))
 
@@ -176,7 +176,7 @@ def _array(name: str, parts: Iterable[Any]) -> Iterator[bytes]:
 
 
 def write_rows(answers: Iterable[Answer[Any]]) -> Iterator[bytes]:
-    """An object with the list ``results``, null for a bad case, without its closing brace."""
+    """Yield an object with the list ``results``, null for a bad case, without its closing brace."""
     opening, rows = b'{"results":[', {-1: b"null"}  # by source code: a row with places for numbers
     for answer in answers:
         codes = answer.source_code.tolist()
@@ -192,12 +192,13 @@ def write_rows(answers: Iterable[Answer[Any]]) -> Iterator[bytes]:
 
 
 def _row_of(columns: Mapping[str, Any], index: int) -> bytes:
-    """The row of a case as text, with a place for each number: the words follow from the source."""
+    """Return the row of a case as text, with a place for each number: the words follow from the
+    source."""
     words = {path: "\0" if column is None else column[index] for path, column in columns.items()}
     return dump(nested(words)).replace(b"%", b"%%").replace(dump("\0"), b"%b")
 
 
 def listed(path: str, column: Any) -> list[Any]:
-    """A column as JSON lists it: NaN is written as null, and so is no text."""
+    """Return a column as JSON lists it: NaN is written as null, and so is no text."""
     values: list[Any] = column.tolist()
     return [value or None for value in values] if path in TEXTS and "" in values else values

@@ -27,7 +27,7 @@ class GuidePages(StaticFiles):
         )
 
     async def get_response(self, path: str, scope: Scope) -> Response:
-        """The file, or the page of the folder."""
+        """Return the file, or the page of the folder."""
         if any(step.startswith(".") for step in path.split("/") if step != "."):
             raise HTTPException(404)
         response = await super().get_response(path, scope)
@@ -39,7 +39,7 @@ class GuidePages(StaticFiles):
 
 
 def _inline_scripts(directory: Path) -> Iterator[str]:
-    """The hashes of the scripts that stand in the pages themselves."""
+    """Yield the hashes of the scripts that stand in the pages themselves."""
     for page in directory.rglob("*.html"):
         for rest in page.read_text("utf-8", "replace").split("<script>")[1:]:
             script = rest.partition("</script>")[0].encode()

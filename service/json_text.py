@@ -68,8 +68,8 @@ def _slowly(text: bytes | bytearray, reader: json.JSONDecoder) -> Any:
 
 
 def decode(text: bytes) -> Any:
-    """A question as Python objects; refused where a name is given twice, or an object has far too
-    many members."""
+    """Return a question as Python objects; refused where a name is given twice, or an object has
+    far too many members."""
     try:
         value = orjson.loads(text)
         if b"{" in text and _members_in(value) != text.count(b":"):  # a name twice, a text
@@ -82,7 +82,7 @@ def decode(text: bytes) -> Any:
 
 
 def _members_in(value: Any) -> int:
-    """The number of members of all objects in a value."""
+    """Return the number of members of all objects in a value."""
     number, values = 0, [value]
     while values:
         one = values.pop()
@@ -114,12 +114,13 @@ _NUMBERS = msgspec.json.Decoder(list[float])
 
 
 def decode_batch(text: bytearray) -> Any:
-    """Any JSON as Python objects, slowly; of a name given twice the last counts."""
+    """Return any JSON as Python objects, slowly; of a name given twice the last counts."""
     return _slowly(text, _OF_BATCHES)
 
 
 def decode_columns(text: bytearray, numbers: Collection[str], rest: Collection[str]) -> Any:
-    """The members of an object: lists of ``numbers`` as arrays, where they hold nothing else.
+    """Return the members of an object: lists of ``numbers`` as arrays, where they hold nothing
+    else.
 
     Raise one of :data:`NotRead` where a name is neither among ``numbers`` nor in ``rest``.
     """
@@ -142,7 +143,7 @@ def _column(value: msgspec.Raw) -> Any:
 
 @lru_cache(maxsize=1)
 def _members(numbers: tuple[str, ...], rest: tuple[str, ...]) -> Callable[[bytearray], Any]:
-    """What takes an object apart, and leaves the texts of ``numbers`` as they are."""
+    """Return what takes an object apart, and leaves the texts of ``numbers`` as they are."""
     kinds: list[tuple[str, Any, Any]] = [(name, msgspec.Raw, msgspec.UNSET) for name in numbers]
     kinds += [(name, Any, msgspec.UNSET) for name in rest]
     members = msgspec.defstruct("Members", kinds, forbid_unknown_fields=True)
@@ -152,8 +153,8 @@ def _members(numbers: tuple[str, ...], rest: tuple[str, ...]) -> Callable[[bytea
 def decode_rows(
     text: bytearray, numbers: Collection[str], words: Collection[str]
 ) -> dict[str, Any]:
-    """Rows as columns: arrays of numbers, an infinite k where it is the word rigid, and lists of
-    words.
+    """Return rows as columns: arrays of numbers, an infinite k where it is the word rigid, and
+    lists of words.
 
     Raise one of :data:`NotRead` unless all rows have the names of the first one, which are among
     ``numbers`` and ``words``, and values of these types.
@@ -179,7 +180,7 @@ def decode_rows(
 
 
 def _first_names(text: bytearray) -> tuple[str, ...]:
-    """The names of the first row."""
+    """Return the names of the first row."""
     first = orjson.loads(text[text.index(b"[") + 1 : text.index(b"}") + 1])
     if not isinstance(first, dict) or len(first) < 2:
         raise ValueError("the first row is no case")
@@ -188,8 +189,8 @@ def _first_names(text: bytearray) -> tuple[str, ...]:
 
 @lru_cache(maxsize=64)
 def _rows(names: tuple[str, ...], numbers: tuple[str, ...]) -> Callable[[bytearray], Any]:
-    """What reads rows with these names in any order; it takes half of the time of rows that are
-    dictionaries."""
+    """Return what reads rows with these names in any order; it takes half of the time of rows that
+    are dictionaries."""
     kinds = {name: float if name in numbers else str for name in names}
     if "k" in kinds:
         kinds["k"] = float | Literal["rigid"]  # type: ignore[assignment]
@@ -198,7 +199,8 @@ def _rows(names: tuple[str, ...], numbers: tuple[str, ...]) -> Callable[[bytearr
 
 
 def count(text: bytes | bytearray, character: bytes) -> int:
-    """How often a character stands in a text; ``text.count`` takes longer where it often does."""
+    """Return how often a character stands in a text; ``text.count`` takes longer where it often
+    does."""
     codes = np.frombuffer(text, np.uint8)
     return int(np.count_nonzero(codes == character[0]))
 

@@ -41,8 +41,8 @@ _BUCKETS_S = (
 
 @contextmanager
 def shared_counters(workers: int) -> Iterator[None]:
-    """A private folder for the counters of all workers, in memory if possible; it is empty, and
-    removed at the end.
+    """Yield a private folder for the counters of all workers, in memory if possible; it is empty,
+    and removed at the end.
 
     Without room for a folder every worker reports its own counters.
     """
@@ -190,7 +190,7 @@ class Metrics:
             self._now[name].set(value)
 
     def text(self) -> bytes:
-        """The exposition format of Prometheus; with several workers, the sum over all."""
+        """Return the exposition format of Prometheus; with several workers, the sum over all."""
         registry = self.registry
         if _SHARED in os.environ:
             registry = CollectorRegistry()

@@ -42,8 +42,8 @@ _access = logging.getLogger("mumacro.access")
 
 
 def for_people(line: Mapping[str, Any]) -> bytes:
-    """A line of the log as a person at a terminal reads it; control characters are escaped, so that
-    a client cannot forge a line or move the cursor."""
+    """Return a line of the log as a person at a terminal reads it; control characters are escaped,
+    so that a client cannot forge a line or move the cursor."""
     rest = {name: x for name, x in line.items() if name not in ("time", "level", "logger")}
     traceback = str(rest.pop("exception", "")).splitlines()
     if "duration_ms" in rest:
@@ -61,7 +61,7 @@ _as_json = partial(orjson.dumps, default=str, option=orjson.OPT_APPEND_NEWLINE)
 
 
 def _written(line: Mapping[str, Any], form: Callable[[Mapping[str, Any]], bytes]) -> bytes:
-    """A line of the log; of what cannot be written, how Python shows it."""
+    """Return a line of the log; of what cannot be written, how Python shows it."""
     try:
         return form(line)
     except Exception:
@@ -150,15 +150,15 @@ class LogLines(logging.Handler):
             self._writes = False
 
     def flush(self) -> None:
-        """At the end, wait a second at most for the last lines."""
+        """Wait a second at most for the last lines."""
         until = time.monotonic() + 1.0
         while (self._waiting or self._writes) and time.monotonic() < until:
             time.sleep(0.01)
 
 
 def log_config(level: str) -> dict[str, Any]:
-    """A ``logging.config.dictConfig`` for this process: everything to standard output, as JSON
-    lines."""
+    """Return a ``logging.config.dictConfig`` for this process: everything to standard output, as
+    JSON lines."""
     return {
         "version": 1,
         "disable_existing_loggers": False,
@@ -169,7 +169,7 @@ def log_config(level: str) -> dict[str, Any]:
 
 
 def _trace_in(scope: Scope) -> dict[str, str]:
-    """The trace that a request belongs to, if it says so (W3C Trace Context)."""
+    """Return the trace that a request belongs to, if it says so (W3C Trace Context)."""
     for name, value in scope["headers"]:
         if name == b"traceparent" and _TRACE.fullmatch(value):
             return {"traceparent": value.decode()}
@@ -196,7 +196,7 @@ class Observer:
 
     @staticmethod
     def marks(scope: Scope) -> tuple[tuple[bytes, bytes], ...]:
-        """The headers of every answer."""
+        """Return the headers of every answer."""
         return (b"x-request-id", scope["request_id"].encode()), NOSNIFF
 
     def record(self, scope: Scope, status: int, seconds: float) -> None:

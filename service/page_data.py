@@ -71,7 +71,7 @@ _UNIT = 1e-4  # what 1 means in the map's integers; a shade of colour is a hundr
 
 
 def _impossible(contact: str, direction: str) -> str:
-    """Why a contact has no such direction; empty where it has."""
+    """Return why a contact has no such direction; empty where it has."""
     try:
         kind_of(contact, direction)
     except InputError:
@@ -80,9 +80,9 @@ def _impossible(contact: str, direction: str) -> str:
 
 
 def names(built: bool) -> dict[str, Any]:
-    """``names.json``: inputs, choices, geometries with arguments, materials, an example of measured
-    points, the version, and where the pages of the documents are: in the guide that was ``built``,
-    or as they are written."""
+    """Return ``names.json``: inputs, choices, geometries with arguments, materials, an example
+    of measured points, the version, and where the pages of the documents are: in the guide that
+    was ``built``, or as they are written."""
     inputs: dict[str, dict[str, Any]] = {
         name: {
             "label": label,
@@ -128,7 +128,7 @@ def names(built: bool) -> dict[str, Any]:
 
 
 def _outputs_of(kind: tuple[str, str]) -> list[str]:
-    """What the page asks beside the friction, of those that a kind has."""
+    """Return what the page asks beside the friction, of those that a kind has."""
     return [
         name
         for name in ("groups", "limits", "gradient", "stick_fraction", "power", "settling")
@@ -137,7 +137,7 @@ def _outputs_of(kind: tuple[str, str]) -> list[str]:
 
 
 def _lacks(kind: tuple[str, str]) -> dict[str, str]:
-    """The outputs that a kind has not, each with the reason."""
+    """Return the outputs that a kind has not, each with the reason."""
     return {
         name: next(reason for word, reason in output.lacks.items() if word in kind)
         for name, output in OUTPUTS.items()
@@ -149,8 +149,8 @@ def _lacks(kind: tuple[str, str]) -> dict[str, str]:
 def map_of(
     surrogate: Surrogate, contact: str = "spring", direction: str = "across"
 ) -> dict[str, Any]:
-    """``map.json``: mu~ of a kind of contact on a grid in whole numbers, rows of constant y~ from
-    below, its border, and what is drawn: levels, colours, places of numbers and regimes."""
+    """Return ``map.json``: mu~ of a kind of contact on a grid in whole numbers, rows of constant
+    y~ from below, its border, and what is drawn: levels, colours, places of numbers and regimes."""
     kind = kind_of(contact, direction)
     ratio, v_crit = surrogate.map_of(kind, _WIDTH, _HEIGHT)
     v, y = plotting.speeds(_WIDTH), plotting.amplitudes(_HEIGHT, kind.normal)
@@ -172,6 +172,6 @@ def map_of(
 
 
 def _scales(units: Mapping[str, Scale]) -> dict[str, list[float]]:
-    """The factor and the divisor of each unit, also as it is typeset, with µ."""
+    """Return the factor and the divisor of each unit, also as it is typeset, with µ."""
     scales = {unit: [scale.times, scale.over] for unit, scale in units.items()}
     return scales | {unit.replace("u", "µ"): scale for unit, scale in scales.items() if "u" in unit}

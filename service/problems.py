@@ -61,11 +61,11 @@ class FieldFault:
 
     @classmethod
     def of(cls, name: str, reason: str, value: object = _NO_VALUE) -> "FieldFault":
-        """The fault of a field at the top of the body, or of a parameter."""
+        """Return the fault of a field at the top of the body, or of a parameter."""
         return cls((name,), reason, value)
 
     def as_json(self, query: bool) -> dict[str, object]:
-        """The entry of ``errors``; the pointer is in RFC 6901's URI fragment form, as in RFC
+        """Return the entry of ``errors``; the pointer is in RFC 6901's URI fragment form, as in RFC
         9457."""
         names = [step for step in self.path if isinstance(step, str)]
         entry: dict[str, object] = {}
@@ -86,7 +86,8 @@ class FieldFault:
 
 
 def _shown(value: object) -> object:
-    """The value as JSON can hold it, and short enough to be shown: NaN becomes the text "NaN"."""
+    """Return the value as JSON can hold it, and short enough to be shown: NaN becomes the text
+    "NaN"."""
     if isinstance(value, str):
         short = value if len(value) <= _MAX_TEXT else value[: _MAX_TEXT - 1] + "…"
         return short.encode("utf-8", "replace").decode()  # half of a surrogate pair is no text
@@ -100,7 +101,7 @@ def _shown(value: object) -> object:
 
 
 def refused(faults: Sequence[FieldFault], **members: Any) -> "RequestError":
-    """The error that reports all of these faults."""
+    """Return the error that reports all of these faults."""
     first = faults[0]
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return RequestError(
@@ -119,7 +120,8 @@ def refuse(faults: Sequence[FieldFault], **members: Any) -> NoReturn:
 def faults_of(
     errors: Iterable[Any], allowed: Iterable[str], parameter: bool | None = None
 ) -> list[FieldFault]:
-    """Pydantic's errors as faults, one per place; ``allowed`` are the names that may be given.
+    """Return Pydantic's errors as faults, one per place; ``allowed`` are the names that may be
+    given.
 
     Those that are not shown have no reason: to find one takes longer than to find the fault.
     """
@@ -143,7 +145,7 @@ def faults_of(
 
 
 def reason_of(error: InputError) -> str:
-    """Why an input is refused, in the words of an answer over HTTP."""
+    """Return why an input is refused, in the words of an answer over HTTP."""
     if error.field in BOUNDS and error.bound in (BOUNDS[error.field], STIFFNESS):
         value = error.value if isinstance(error.value, (int, float)) else math.nan
         return refusal(error.field, value)
@@ -151,7 +153,7 @@ def reason_of(error: InputError) -> str:
 
 
 def _reason(error: Any, name: str, allowed: Iterable[str]) -> str:
-    """What is wrong with a value, in the words of the library where it has some."""
+    """Return what is wrong with a value, in the words of the library where it has some."""
     kind, value = error["type"], error["input"]
     cause = error.get("ctx", {}).get("error")
     if isinstance(cause, InputError):
@@ -194,15 +196,15 @@ _LARGE = 1e308
 
 
 def names_of(model: type[BaseModel]) -> tuple[str, ...]:
-    """What a model may be given: inputs first, options after them."""
+    """Return what a model may be given: inputs first, options after them."""
     fields = model.model_fields
     inputs = [name for name in (*INPUTS, *LIKE) if name in fields]
     return tuple(dict.fromkeys([*inputs, *fields]))
 
 
 def _place(path: tuple[str | int, ...], body: Any) -> tuple[str | int, ...]:
-    """A place as far as the body has it: within a value that stands for a list of one, such as a
-    target, there is none."""
+    """Return a place as far as the body has it: within a value that stands for a list of one, such
+    as a target, there is none."""
     for i, step in enumerate(path):
         if isinstance(step, int) and not isinstance(body, list):
             return path[:i]
@@ -219,7 +221,7 @@ def invalid(
     members: Mapping[str, Any],
     parameter: bool | None = None,
 ) -> "RequestError":
-    """The error that reports what a model refuses in the members of a body or query."""
+    """Return the error that reports what a model refuses in the members of a body or query."""
     errors = [
         {**fault, "loc": _place(fault["loc"], members)} for fault in error.errors(include_url=False)
     ]
@@ -231,15 +233,15 @@ def invalid(
 
 
 def _understood(members: Any) -> dict[str, Any]:
-    """What was understood of the other inputs, where the request asks for it."""
+    """Return what was understood of the other inputs, where the request asks for it."""
     if not isinstance(members, Mapping) or not is_wanted(members):
         return {}
     return {UNDERSTOOD: understood(members)}
 
 
 def _absent_in(members: Mapping[str, Any]) -> Iterator[FieldFault]:
-    """The faults of inputs of which one of several is required: the library would tell the first
-    of them, when everything else is right."""
+    """Yield the faults of inputs of which one of several is required: the library would tell the
+    first of them, when everything else is right."""
     directions = members.get("direction", "across")
     words = directions if isinstance(directions, (list, np.ndarray)) else [directions]
     normal = any(isinstance(word, str) and word == "normal" for word in words)
@@ -332,7 +334,7 @@ ABORT, FULL, REFUSED = "abort", "full", "refused"
 
 
 def path_in(scope: Scope) -> str:
-    """The path without what a proxy has put before it."""
+    """Return the path without what a proxy has put before it."""
     return str(scope["path"]).removeprefix(scope.get("root_path", ""))
 
 
@@ -340,7 +342,7 @@ def path_in(scope: Scope) -> str:
 
 
 def meaning(error: Exception, scope: Scope) -> RequestError:
-    """What an exception means for its request."""
+    """Return what an exception means for its request."""
     if isinstance(error, RequestError):
         return error
     if isinstance(error, InputError):
@@ -352,7 +354,7 @@ def meaning(error: Exception, scope: Scope) -> RequestError:
 
 
 def _of_http(error: HTTPException, scope: Scope) -> RequestError:
-    """What Starlette refuses: no such path, method or part of a file."""
+    """Return what Starlette refuses: no such path, method or part of a file."""
     kinds = (kind for kind in ProblemKind if kind.status == error.status_code)
     kind = next(kinds, ProblemKind.UNEXPECTED)
     detail, headers = error.detail, error.headers
@@ -374,7 +376,7 @@ _NO_GUIDE = (
 
 
 def _no_such_path(scope: Scope) -> str:
-    """What to do about a path that is not there."""
+    """Return what to do about a path that is not there."""
     path = path_in(scope)
     if scope["app"].state.settings.guide is None and (path + "/").startswith("/guide/"):
         return _NO_GUIDE
@@ -382,7 +384,7 @@ def _no_such_path(scope: Scope) -> str:
 
 
 def of_input(error: InputError, **members: Any) -> RequestError:
-    """What the library refuses, such as a relation between inputs."""
+    """Return what the library refuses, such as a relation between inputs."""
     value = _NO_VALUE if error.value is None else error.value
     path: tuple[str | int, ...] = (error.field,)
     if error.index is not None:
@@ -392,7 +394,7 @@ def of_input(error: InputError, **members: Any) -> RequestError:
 
 @contextmanager
 def with_members(**members: Any) -> Iterator[None]:
-    """Members that the problem document of a refusal has beside its faults."""
+    """Yield members that the problem document of a refusal has beside its faults."""
     try:
         yield
     except InputError as error:
@@ -403,7 +405,7 @@ def with_members(**members: Any) -> Iterator[None]:
 
 
 def document_of(error: RequestError, scope: Scope) -> dict[str, Any]:
-    """The problem document of an error."""
+    """Return the problem document of an error."""
     slug = error.kind.name.lower().replace("_", "-")
     body: dict[str, Any] = {"type": f"urn:problem-type:mumacro:{slug}", "title": error.kind.title}
     # a server may leave halves of surrogate pairs in a path
@@ -419,7 +421,7 @@ def document_of(error: RequestError, scope: Scope) -> dict[str, Any]:
 
 
 def problem_of(error: RequestError, scope: Scope) -> Response:
-    """The response to an error."""
+    """Return the response to an error."""
     headers = {"Cache-Control": "no-store", **error.kind.headers, **error.headers}
     content = orjson.dumps(document_of(error, scope))
     return Response(
@@ -428,7 +430,7 @@ def problem_of(error: RequestError, scope: Scope) -> Response:
 
 
 def answer_to(error: Exception, scope: Scope) -> ASGIApp:
-    """The answer to a request that ended with an exception."""
+    """Return the answer to a request that ended with an exception."""
     request_error = meaning(error, scope)
     answer = problem_of(request_error, scope)
     is_slow = request_error.kind in (ProblemKind.SLOW_CLIENT, ProblemKind.TOOK_TOO_LONG)

@@ -51,7 +51,7 @@ async def from_client(move: Awaitable[T], limit: int) -> T:
 
 @asynccontextmanager
 async def within(limit: int) -> AsyncIterator[None]:
-    """A time limit of a whole answer: its reading, computing and sending."""
+    """Yield a time limit of a whole answer: its reading, computing and sending."""
     try:
         async with asyncio.timeout(limit):
             yield
@@ -84,7 +84,7 @@ def only_json(headers: Mapping[bytes, bytes], remedy: str = "") -> None:
 
 
 def _is_utf8(parameters: str) -> bool:
-    """Whether the parameters of a media type name no other character set.
+    """Return whether the parameters of a media type name no other character set.
 
     >>> _is_utf8('version=1; charset="UTF-8"'.lower()), _is_utf8("charset=latin-1")
     (True, False)
@@ -104,8 +104,8 @@ async def read_body(
     limit: int,
     scope: Scope,
 ) -> bytearray:
-    """The body of a request, which its ticket holds, unless it is small and there at once: then it
-    is answered before anything else is read."""
+    """Return the body of a request, which its ticket holds, unless it is small and there at once:
+    then it is answered before anything else is read."""
     length = headers.get(b"content-length", b"0").strip()
     size = int(length) if length.isdigit() and len(length) < 19 else limit + 1
     body, more = bytearray(), True
@@ -136,7 +136,7 @@ async def read_body(
 
 
 async def small_body(request: Request) -> bytes:
-    """The bytes of a small JSON body, beside which there is no query."""
+    """Return the bytes of a small JSON body, beside which there is no query."""
     headers = dict(request.scope["headers"])
     if headers.get(b"content-type") != JSON or b"content-encoding" in headers:
         only_json(headers)
@@ -159,7 +159,7 @@ async def small_body(request: Request) -> bytes:
 
 
 def members_of(query: bytes) -> dict[str, Any]:
-    """The parameters of a query as a body has them: numbers as numbers, others as texts."""
+    """Return the parameters of a query as a body has them: numbers as numbers, others as texts."""
     members: dict[str, Any] = {}
     repeats: dict[str, None] = {}
     for name, value in _pairs(query):
@@ -175,7 +175,7 @@ def members_of(query: bytes) -> dict[str, Any]:
 
 
 def _pairs(query: bytes) -> list[tuple[str, str]]:
-    """Names and values of a query."""
+    """Return names and values of a query."""
     text = query.decode("latin-1")
     # what urllib would take longer to find
     if not query.translate(None, _PLAIN) and query.count(b"&") < 100:
@@ -190,8 +190,8 @@ def _pairs(query: bytes) -> list[tuple[str, str]]:
 
 
 def _number(text: str) -> Any:
-    """A number where the text is one, else the text; an unescaped "+" of a query arrives as a
-    space."""
+    """Return a number where the text is one, else the text; an unescaped "+" of a query arrives as
+    a space."""
     if text.strip("0123456789.eE+- ") == "":
         try:
             number = float(text.replace("e ", "e+").replace("E ", "E+"))
@@ -205,7 +205,8 @@ def _number(text: str) -> Any:
 
 
 async def understood_in(request: Request, is_requested: bool) -> dict[str, Any]:
-    """The member of an answer with what was understood of a request in JSON, where it is wanted."""
+    """Return the member of an answer with what was understood of a request in JSON, where it is
+    wanted."""
     return {UNDERSTOOD: understood(decode(await request.body()))} if is_requested else {}
 
 
@@ -271,7 +272,7 @@ class Direct:
 
 
 def of_members(model: Any, members: Mapping[str, Any]) -> Any:
-    """The model of these members."""
+    """Return the model of these members."""
     try:
         return model.model_validate(members)
     except ValidationError as error:
@@ -279,7 +280,7 @@ def of_members(model: Any, members: Mapping[str, Any]) -> Any:
 
 
 def validated(model: Any, text: bytes) -> Any:
-    """The model that a JSON text holds."""
+    """Return the model that a JSON text holds."""
     try:
         instance = model.model_validate_json(text)
     except ValidationError as error:

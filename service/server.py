@@ -31,7 +31,7 @@ _TOO_LARGE = RequestError(
 
 
 def _without_upgrade(headers: list[tuple[bytes, bytes]]) -> Iterator[tuple[bytes, bytes]]:
-    """The fields of a head that do not ask for another protocol."""
+    """Yield the fields of a head that do not ask for another protocol."""
     for name, value in headers:
         if name == b"connection":
             options = (option.strip() for option in value.split(b","))
@@ -132,7 +132,7 @@ class Connection(HttpToolsProtocol):
             self.transport.close()
 
     def _refused(self, status: int) -> Any:
-        """The scope of a request that is refused here, seen by the observer, now or when the
+        """Return the scope of a request that is refused here, seen by the observer, now or when the
         application has ended."""
         if self._busy:
             busy: Any = self.scope
@@ -239,7 +239,7 @@ class Connection(HttpToolsProtocol):
         self._watch()
 
     def resume_writing(self) -> None:
-        """The client has read."""
+        """Go on: the client has read."""
         super().resume_writing()
         self._due = math.inf
 
@@ -274,7 +274,7 @@ class Connection(HttpToolsProtocol):
         self._end = self.loop.time() + self._settings.time_limit_s + _MARGIN_S
 
     def on_message_complete(self) -> None:
-        """The client has sent its request."""
+        """Take a request that the client has sent whole."""
         if self._in_head:  # what follows is read again
             return
         self._due = math.inf

@@ -24,7 +24,7 @@ class SettingsError(ValueError):
 
 
 def _split(value: Any, separator: str = ",") -> Any:
-    """``a, b`` -> [``a``, ``b``]; what is no text is taken as it is."""
+    """Return ``a, b`` -> [``a``, ``b``]; what is no text is taken as it is."""
     return (
         [part.strip() for part in value.split(separator) if part.strip()]
         if isinstance(value, str)
@@ -33,7 +33,7 @@ def _split(value: Any, separator: str = ",") -> Any:
 
 
 def _pairs(value: Any) -> Any:
-    """``a=1, b=2`` -> {``a``: ``1``, ``b``: ``2``}; what is no text is taken as it is.
+    """Return ``a=1, b=2`` -> {``a``: ``1``, ``b``: ``2``}; what is no text is taken as it is.
 
     ValueError for a part without a name, and for a name that is given twice.
     """
@@ -55,7 +55,7 @@ def _without_dots(path: str) -> str:
 
 
 def _an_origin(text: str) -> str:
-    """The origin of a page as a browser sends it: no path, no slash at the end."""
+    """Return the origin of a page as a browser sends it: no path, no slash at the end."""
     parts = urlsplit(text)
     if text != "*" and not (parts.netloc and text == f"{parts.scheme}://{parts.netloc}".lower()):
         raise ValueError("not an origin")
@@ -162,7 +162,7 @@ class Settings(BaseSettings):
     shutdown_grace_s: int = _whole(10, 0, 3600)
 
     def keys(self) -> dict[str, str]:
-        """API key -> name of its holder, which logs show; empty where no key is needed."""
+        """Return API key -> name of its holder, which logs show; empty where no key is needed."""
         holders = {key.get_secret_value(): name for name, key in self.api_keys.items()}
         if self.api_key is not None:
             holders.setdefault(self.api_key.get_secret_value(), "default")
@@ -181,8 +181,8 @@ class Settings(BaseSettings):
 
 
 def load_settings(**overrides: Any) -> Settings:
-    """The settings of the environment; ``overrides`` win.  SettingsError names all that is bad, in
-    one line."""
+    """Return the settings of the environment; ``overrides`` win. SettingsError names all that is
+    bad, in one line."""
     try:
         return Settings(**overrides)
     except ValidationError as error:
@@ -196,8 +196,8 @@ def load_settings(**overrides: Any) -> Settings:
 
 
 def unknown_variables() -> list[str]:
-    """Variables that begin with MUMACRO_ and are not settings: mostly spelling mistakes, so the log
-    warns of them."""
+    """Return variables that begin with MUMACRO_ and are not settings: mostly spelling mistakes, so
+    the log warns of them."""
     names = {f"{PREFIX}{name.upper()}" for name in Settings.model_fields}
     return sorted(
         name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in names

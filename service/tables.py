@@ -18,8 +18,8 @@ _log = logging.getLogger("mumacro.tables")
 
 
 def _files(paths: Sequence[Path]) -> list[Path]:
-    """Files among ``paths``, and the ``*.nc`` files of the directories among them, in order of
-    name.
+    """Return files among ``paths``, and the ``*.nc`` files of the directories among them, in order
+    of name.
 
     TableError where a path is missing, or a directory holds no table.
     """
@@ -35,7 +35,7 @@ def _files(paths: Sequence[Path]) -> list[Path]:
 
 
 def _stamp(path: Path) -> tuple[int, int, int]:
-    """Size, time and place of a file; TableError where there is none."""
+    """Return size, time and place of a file; TableError where there is none."""
     try:
         status = path.stat()
     except OSError as error:
@@ -118,7 +118,7 @@ class Tables:
             table.check()
 
     def pick(self, tolerance: float | None = None, parameter: bool | None = None) -> LoadedTable:
-        """The tightest table, or the smallest one that meets ``tolerance`` (relative to mu0
+        """Return the tightest table, or the smallest one that meets ``tolerance`` (relative to mu0
         [-])."""
         if self.fault is not None:
             raise RequestError(ProblemKind.NOT_READY, self.fault)

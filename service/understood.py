@@ -16,7 +16,7 @@ UNDERSTOOD = "inputs"  # the name in include
 
 
 def is_wanted(members: Mapping[str, Any]) -> bool:
-    """Whether a request asks for it; its members may be of any type."""
+    """Return whether a request asks for it; its members may be of any type."""
     include = members.get("include")
     return include == UNDERSTOOD or (
         isinstance(include, (list, tuple, set)) and UNDERSTOOD in include
@@ -24,9 +24,9 @@ def is_wanted(members: Mapping[str, Any]) -> bool:
 
 
 def understood(members: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Each input that can be read: its text, its value in SI, the unit that was typed or the SI
-    unit; the deviation and the ends of an interval where it has them.  An input that is refused is
-    left out.
+    """Return each input that can be read: its text, its value in SI, the unit that was typed or the
+    SI unit; the deviation and the ends of an interval where it has them. An input that is refused
+    is left out.
 
     >>> understood({"k": "1 ± 0.1 N/um", "target": "15 %"})["target"]
     {'text': '15 %', 'value': 0.15, 'unit': '%'}
@@ -54,7 +54,7 @@ def understood(members: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 def _part(name: str, value: Any) -> dict[str, Any] | None:
-    """An oscillation of a motion: the amplitude of its first harmonic, and all of them."""
+    """Return an oscillation of a motion: the amplitude of its first harmonic, and all of them."""
     if value is None:
         return None
     try:
@@ -71,12 +71,12 @@ def _part(name: str, value: Any) -> dict[str, Any] | None:
 
 
 def _is_pair(value: Any) -> bool:
-    """Whether a list of JSON is an amplitude and its phase."""
+    """Return whether a list of JSON is an amplitude and its phase."""
     return isinstance(value, list) and len(value) == 2 and not isinstance(value[0], dict)
 
 
 def _of(name: str, value: Any, quantity: str) -> dict[str, Any] | None:
-    """One value, None where there is none; InputError where it cannot be read."""
+    """Return one value, None where there is none; InputError where it cannot be read."""
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         return None
     one, unit = read(name, value, quantity), QUANTITIES[quantity].unit

@@ -45,8 +45,8 @@ class ExportError(MumacroError):
 
 
 def header_text(table: Table) -> str:
-    """All of it in one header, whose functions are static: it may be included in several files of a
-    program."""
+    """Return all of it in one header, whose functions are static: it may be included in several
+    files of a program."""
     kernel = join_includes("kernel.c", set()) + table_text(table, "static ") + _file("interface.c")
     private = _PRIVATE.sub(lambda match: f"mumacro_{match[1]}_", kernel)
     banner = _BANNER.format("Declarations, the kernel, the table, the interface")
@@ -55,8 +55,8 @@ def header_text(table: Table) -> str:
 
 
 def files(table: Table) -> dict[str, str]:
-    """The texts of ``mumacro.h``, ``mumacro.c`` and ``mumacro_table.c``; the first two are the same
-    for all tables."""
+    """Return the texts of ``mumacro.h``, ``mumacro.c`` and ``mumacro_table.c``; the first two are
+    the same for all tables."""
     file_names: set[str] = set()
     return {
         "mumacro.h": _BANNER.format("What mumacro.c defines") + _file("mumacro.h"),
@@ -102,7 +102,7 @@ def write_c(table: Table, out: Path) -> list[Path]:
 
 
 def join_includes(name: str, file_names: set[str]) -> str:
-    """A file of the kernel with those that it includes, each once."""
+    """Return a file of the kernel with those that it includes, each once."""
     file_names.add(name)
     lines = []
     for line in _file(name).splitlines(keepends=True):
@@ -122,7 +122,8 @@ def _file(name: str) -> str:
 
 
 def table_text(table: Table, linkage: str) -> str:
-    """The arrays of :class:`mumacro.kernel.binding.Data` as constants, and ``mumacro_table``."""
+    """Return the arrays of :class:`mumacro.kernel.binding.Data` as constants, and
+    ``mumacro_table``."""
     border, pieces = border_cells(table.border)
     arrays: dict[str, Array] = {"border": border, "pieces": pieces, "outer": outer_cells()}
     arrays["rule_driven"] = driven_rule()
@@ -137,7 +138,7 @@ def table_text(table: Table, linkage: str) -> str:
 
 
 def _contact_text(contact: TabulatedContact, table: Table, arrays: dict[str, Array]) -> str:
-    """The initializer of one contact's ``mumacro_data``, whose arrays are added."""
+    """Return the initializer of one contact's ``mumacro_data``, whose arrays are added."""
     blocks = f"{contact.name}_blocks"
     arrays[blocks] = block_rows(contact)
     rows = [f"{len(arrays['border'])}, {_names('', ('border', 'pieces', blocks, 'outer'))}"]
@@ -168,7 +169,7 @@ def _names(prefix: str, parts: Iterable[str]) -> str:
 
 
 def _array(name: str, values: Array) -> str:
-    """Eight numbers a line, each in the fewest digits that read back exactly."""
+    """Return eight numbers a line, each in the fewest digits that read back exactly."""
     rows = values.reshape(-1, 8 if values.size % 8 == 0 else values.shape[-1]).tolist()
     lines = (",".join(map(_number, row)) for row in rows)
     return f"static const double {name}[{values.size}] = {{\n{f',{chr(10)}'.join(lines)}}};\n\n"

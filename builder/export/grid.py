@@ -26,7 +26,7 @@ PLANE = ("mu_ratio", "stick_fraction", "error_estimate")
 
 
 def long_columns(table: Table) -> dict[str, Array]:
-    """The grid with a row a node, ``y_tilde`` running fastest; columns (m n,) [-]."""
+    """Return the grid with a row a node, ``y_tilde`` running fastest; columns (m n,) [-]."""
     v, y, crit = np.broadcast_arrays(table.v_tilde[:, None], table.y_tilde, table.v_tilde_crit)
     plane = {name: np.asarray(getattr(table, name)) for name in PLANE}
     columns = {"v_tilde": v, "y_tilde": y, **plane, "v_tilde_crit": crit}
@@ -34,7 +34,7 @@ def long_columns(table: Table) -> dict[str, Array]:
 
 
 def grid_errors(table: Table) -> dict[str, float]:
-    """What tools err by that interpolate the grid, as the table names it."""
+    """Return what tools err by that interpolate the grid, as the table names it."""
     return {name: float(table.attributes[name]) for name in INTERPOLATION_ERRORS}
 
 

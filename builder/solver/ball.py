@@ -49,7 +49,7 @@ def _rule(points: int) -> tuple[Array, Array]:
 
 
 def points_for(tolerance: float) -> int:
-    """Points on either side with which a quadrature errs by far less than ``tolerance``."""
+    """Return points on either side with which a quadrature errs by far less than ``tolerance``."""
     return next((points for least, points in FEWER_POINTS.items() if tolerance >= least), POINTS)
 
 
@@ -72,7 +72,7 @@ class Springs:
             self._data = fine.tabulated.data(name)  # one for all, which has the cells then
 
     def crit(self, y: Array) -> Array:
-        """v~crit of one spring."""
+        """Return v~crit of one spring."""
         return self.fine.border(y)
 
     def __call__(self, v: Array, y: Array, eta: Array) -> dict[str, Array]:
@@ -103,7 +103,7 @@ class Springs:
 
 
 def _corner(v: Array, eta: Array) -> tuple[Array, Array]:
-    """The corner's coordinates as evaluation has them, without a rounded y~ in between."""
+    """Return the corner's coordinates as evaluation has them, without a rounded y~ in between."""
     phi = kernels[-1].normal_form_root(v, eta)
     s0 = np.sqrt(2.0 * math.pi * v / phi)
     radius = np.sqrt(0.5 * s0 * s0 + 2.0 * phi * phi)
@@ -111,7 +111,7 @@ def _corner(v: Array, eta: Array) -> tuple[Array, Array]:
 
 
 def _fast_deficit(v: Array, y: Array) -> Array:
-    """1 - mu~ for large v~, with the digits that it has."""
+    """Return 1 - mu~ for large v~, with the digits that it has."""
     share = 1.0 / (1.0 + v * v)
     r = y / np.hypot(1.0, v)
     n = np.square(np.minimum(r, 1.0))
@@ -140,8 +140,8 @@ class Ball:
         self._share, self._weight = _rule(points)
 
     def crossings(self, ratio: Array) -> tuple[Array, Array]:
-        """y~ at which rays V/Y = ``ratio`` (n,), below the steepest, enter stick-slip and leave
-        it."""
+        """Return y~ at which rays V/Y = ``ratio`` (n,), below the steepest, enter stick-slip and
+        leave it."""
         steep = math.log(STEEPEST_Y)
         low, high = np.log(1.5 * ratio), np.full(ratio.shape, steep)
         entry = self._bisect(ratio, np.minimum(low, steep - 1e-9), high, 1.0)
@@ -157,8 +157,8 @@ class Ball:
         return np.exp(0.5 * (low + high))
 
     def _edges(self, v: Array, y: Array) -> Array:
-        """Values of s (n, edges), descending from 1 to 0, between which springs are smooth and of
-        like size."""
+        """Return values of s (n, edges), descending from 1 to 0, between which springs are smooth
+        and of like size."""
         ratio = v / y
         cuts = ratio < STEEPEST * (1.0 - 1e-15)
         entry, leave = self.crossings(np.where(cuts, ratio, 0.1))
@@ -180,7 +180,7 @@ class Ball:
         return np.stack([*decades, np.zeros(v.shape)], axis=1)
 
     def solve(self, v: Array, y: Array, eta: Array | None = None) -> dict[str, Array]:
-        """:data:`NAMES` at V = ``v``, Y = ``y``, of one shape; eta = Y - 1."""
+        """Return :data:`NAMES` at V = ``v``, Y = ``y``, of one shape; eta = Y - 1."""
         v, y = np.broadcast_arrays(v, y)
         shape = v.shape
         eta = y - 1.0 if eta is None else np.broadcast_to(eta, shape)

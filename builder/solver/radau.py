@@ -76,7 +76,7 @@ def _solve_in_place(a: np.ndarray, b: np.ndarray) -> None:
 
 @solver_kernel
 def _direction(x: float, chart: int) -> tuple[float, float, float]:
-    """u_x, u_y and 1 - u_x [-] of the local angle ``x`` [rad] in ``chart``."""
+    """Return u_x, u_y and 1 - u_x [-] of the local angle ``x`` [rad] in ``chart``."""
     s, c = math.sin(x), math.cos(x)
     if chart == 0:
         half = math.sin(0.5 * x)
@@ -95,8 +95,8 @@ def collocate(
     length: float,
     sums: np.ndarray,
 ) -> tuple[float, float]:
-    """One step of ``length`` [rad] from (sigma, chart base + x0), started on the slow manifold tan
-    th = y cos tau / v.
+    """Return one step of ``length`` [rad] from (sigma, chart base + x0), started on the slow
+    manifold tan th = y cos tau / v.
 
     cos tau = sign sin sigma.  Adds the integrals of u_x, 1 - u_x, lam and y cos tau u_y to ``sums``
     (4,).  Returns the local angle at the end [rad], NaN without convergence, and the smallest lam

@@ -34,15 +34,15 @@ DURATION, COS_0, DEFICIT_0, SIN_0, SIGMA_0, SIGMA_1 = range(6)
 
 @solver_kernel
 def border_guess(y: float) -> float:
-    """v~crit [-] to about 15 %: the harmonic blend of both ends, eqs. (24), (26) with the exact
-    constant."""
+    """Return v~crit [-] to about 15 %: the harmonic blend of both ends, eqs. (24), (26) with the
+    exact constant."""
     return 1.0 / (2.0 / (y * y) + 1.0 / (BORDER_SLOPE * math.sqrt(y)))
 
 
 @solver_kernel
 def _direction(x0: float, chart: int) -> tuple[float, float, float]:
-    """cos, sin and 1 - cos [-] of the angle th0 = ``x0`` [rad] where slip stops, in chart 1 pi/2 -
-    ``x0``."""
+    """Return cos, sin and 1 - cos [-] of the angle th0 = ``x0`` [rad] where slip stops, in chart 1
+    pi/2 - ``x0``."""
     half = math.sin(0.5 * x0)
     c, s = math.cos(x0), math.sin(x0)
     return (c, s, 2.0 * half * half) if chart == FRONT else (s, c, 1.0 - s)
@@ -222,8 +222,8 @@ def _edge(v: float, y: float) -> float:
 def stick_slip(
     v: float, y: float, eta: float, hint: float, w: np.ndarray, out: np.ndarray, orbit: np.ndarray
 ) -> int:
-    """Steady stick-slip orbit into ``out`` and ``orbit`` by the bracketed secant method; returns a
-    status.
+    """Return steady stick-slip orbit into ``out`` and ``orbit`` by the bracketed secant method;
+    returns a status.
 
     ``hint`` = th0 [rad] if something is known of it, as next to the border, else NaN.
     """

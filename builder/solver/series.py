@@ -64,8 +64,8 @@ def series(v: float, y: float, c0: float, c1: float, x: float, chart: int, w: np
 
 @solver_kernel
 def increment(p: np.ndarray, t: float) -> float:
-    """p(t) - p(0), not a difference, of the Taylor coefficients ``p`` (ORDER + 2,) a time ``t``
-    [rad] into the step."""
+    """Return p(t) - p(0), not a difference, of the Taylor coefficients ``p`` (ORDER + 2,) a time
+    ``t`` [rad] into the step."""
     r: float = p[ORDER]
     for k in range(ORDER - 1, 0, -1):
         r = r * t + p[k]
@@ -74,14 +74,14 @@ def increment(p: np.ndarray, t: float) -> float:
 
 @solver_kernel
 def value(p: np.ndarray, t: float) -> float:
-    """p(t), as :func:`increment`."""
+    """Return p(t), as :func:`increment`."""
     r: float = increment(p, t) + p[0]
     return r
 
 
 @solver_kernel
 def slope(p: np.ndarray, t: float) -> float:
-    """p'(t), as :func:`increment`."""
+    """Return p'(t), as :func:`increment`."""
     r: float = ORDER * p[ORDER]
     for k in range(ORDER - 1, 0, -1):
         r = r * t + k * p[k]
@@ -111,7 +111,7 @@ def integral_of_product(p: np.ndarray, q: np.ndarray, t: float) -> float:
 
 @solver_kernel
 def root(p: np.ndarray, lo: float, hi: float) -> float:
-    """Root of p in [lo, hi], where the sign changes: Newton kept inside the bracket."""
+    """Return root of p in [lo, hi], where the sign changes: Newton kept inside the bracket."""
     up = value(p, hi) > 0.0
     t = 0.5 * (lo + hi)
     # the window of slip may be as short as 1e-30: bisection alone must get there

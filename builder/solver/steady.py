@@ -113,8 +113,8 @@ def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
 
 @solver_kernel
 def border_raw(y: float, w: np.ndarray, out: np.ndarray) -> tuple[float, float, int]:
-    """(v~crit, mu~ there, status): where the smallest slip speed of the continuous orbit reaches
-    zero."""
+    """Return (v~crit, mu~ there, status): where the smallest slip speed of the continuous orbit
+    reaches zero."""
     guess = border_guess(y)
     lo, hi = 0.7 * guess, 1.4 * guess
     z, z_old, f_old = 1.02 * guess, 0.0, math.inf
@@ -200,8 +200,8 @@ def solve_raw(
     orbit: np.ndarray,
     res: np.ndarray,
 ) -> int:
-    """Steady state at v~ = ``v``, y~ = ``y``, eta = y~ - 1 [-] into ``res`` (7,); the rest is
-    workspace; a status."""
+    """Return steady state at v~ = ``v``, y~ = ``y``, eta = y~ - 1 [-] into ``res`` (7,); the rest
+    is workspace; a status."""
     res[:] = math.nan
     hint = least = math.nan
     if v > 0.75 * border_guess(y):
@@ -283,8 +283,8 @@ def _refuse(field: str, values: NDArray[np.float64], right: NDArray[np.bool_], b
 
 @solver_kernel
 def workspace() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Arrays ``w``, ``out``, ``orbit``, ``res`` that :func:`solve_raw` writes to; one set per
-    thread."""
+    """Return arrays ``w``, ``out``, ``orbit``, ``res`` that :func:`solve_raw` writes to; one set
+    per thread."""
     return np.zeros((9, ORDER + 2)), np.zeros(12), np.zeros(6), np.zeros(N_RESULTS)
 
 
@@ -326,7 +326,7 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
 
 
 def border(y: float) -> tuple[float, float]:
-    """Border of continuous sliding: (v~crit, mu~ on it) at the amplitude y~ = ``y`` [-] in
+    """Return border of continuous sliding: (v~crit, mu~ on it) at the amplitude y~ = ``y`` [-] in
     ``builder.solver.steady.Y_RANGE``.
 
     Raises

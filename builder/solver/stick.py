@@ -14,13 +14,13 @@ SCAN = 24  # samples of half a period
 
 @solver_kernel
 def _sinc(a: float) -> float:
-    """sin a / a."""
+    """Return sin a / a."""
     return 1.0 - a * a / 6.0 if abs(a) < 1e-4 else math.sin(a) / a
 
 
 @solver_kernel
 def _third(d: float) -> float:
-    """(d - sin d) / d^2."""
+    """Return (d - sin d) / d^2."""
     if d < 0.3:
         q = d * d
         return d * (
@@ -35,8 +35,8 @@ def _third(d: float) -> float:
 def stick_excess(
     v: float, y: float, eta: float, x0: float, chart: int, s0: float, s1: float, d: float
 ) -> float:
-    """(|u|^2 - 1) / d^2 [-] a time ``d`` [rad] after slip stopped at (s0, chart base + x0); s1 = s0
-    + d - pi.
+    """Return (|u|^2 - 1) / d^2 [-] a time ``d`` [rad] after slip stopped at (s0, chart base + x0);
+    s1 = s0 + d - pi.
 
     The double root at d = 0 is divided out with lam = 0 at the onset; at d = 0 this is d lam/d tau
     there.
@@ -68,7 +68,7 @@ def _chandrupatla(
     fb: float,
     in_sigma: bool,
 ) -> float:
-    """Root of stick_excess in d, or in sigma1 if ``in_sigma``, between a and b [rad].
+    """Return root of stick_excess in d, or in sigma1 if ``in_sigma``, between a and b [rad].
 
     Chandrupatla's bracketed inverse interpolation (Advances in Engineering Software 28, 1997).
     """

@@ -64,7 +64,8 @@ _LOGARITHMIC = ("y_root", "v_root", "ray_root")
 
 
 def _small_rest(chart: Chart, v: Array, y: Array, solution: dict[str, Array]) -> Array:
-    """mu~ less a base of 1 and a logarithm, by 1 - mu~, whose digits are left where y~ is small."""
+    """Return mu~ less a base of 1 and a logarithm, by 1 - mu~, whose digits are left where y~ is
+    small."""
     level = 0.375 * np.log(y) if chart.a.name == "y_root" else 0.1875 * np.log(v)
     return np.asarray(-solution["deficit"] - y * y * level)
 
@@ -74,8 +75,8 @@ def _next(n: int) -> int:
 
 
 def _tail(coefficients: Array, axis: int) -> float:
-    """What the interpolant still misses along one axis: its last two Chebyshev coefficients, summed
-    over the other."""
+    """Return what the interpolant still misses along one axis: its last two Chebyshev coefficients,
+    summed over the other."""
     c = np.abs(np.moveaxis(coefficients, axis, 0)).reshape(coefficients.shape[axis], -1)
     return float(c[-2:].sum(axis=1).max())
 
@@ -115,7 +116,7 @@ def _position(axis: Axis, x: Array) -> Array:
 
 
 def _block_cells(chart: Chart, values: Array, axis: int, bound: float) -> int:
-    """:func:`_fewest` along one axis of a block, on lines that cover the other."""
+    """Return :func:`_fewest` along one axis of a block, on lines that cover the other."""
     along, lines = (chart.a, chart.b)[axis], np.cos(np.linspace(0.0, np.pi, LINES))
     c = np.moveaxis(chebyshev_coefficients(values), axis, 0)
     across = c @ interpolation_matrix(values.shape[1 - axis], lines).T
@@ -136,8 +137,8 @@ def _border_cells(piece: int, values: Array, bound: float) -> int:
 
 
 def build_border(sweep: Sweep, tolerance: float) -> list[BorderPiece]:
-    """The stored border; its own tolerance is tighter than the table's, since every stick-slip node
-    is built on it."""
+    """Return the stored border; its own tolerance is tighter than the table's, since every
+    stick-slip node is built on it."""
     bound = max(1e-3 * tolerance, 4e-15)
     pieces = []
     for piece, (_, axis, _) in enumerate(BORDER_PIECES):

@@ -58,7 +58,7 @@ Progress = Callable[[str, bool], None]
 
 
 def stages() -> int:
-    """How many stages a build has, each of which calls ``progress`` when it is done."""
+    """Return how many stages a build has, each of which calls ``progress`` when it is done."""
     of_contacts = sum(len(charts) + len(("errors", "fresh solves")) for charts in CHARTS.values())
     return len(("border", "plain grid")) + of_contacts
 
@@ -170,7 +170,7 @@ SOLVED_BY: dict[str, Callable[[Table, float, Sweep], SolvedContact]] = {
 
 
 def springs_for(table: Table, workers: int) -> Springs:
-    """The springs that a ball is integrated over: those of ``table`` where its tolerance is
+    """Return the springs that a ball is integrated over: those of ``table`` where its tolerance is
     :data:`.contacts.FINE`, else those of the bundled table of that tolerance.
 
     They are compared with fresh solves first, on ``workers`` threads: the solver may have changed
@@ -231,7 +231,8 @@ def _state_errors(surrogate: Surrogate, contact: SolvedContact, seed: int) -> li
 
 
 def verified_attributes(report: dict[str, Any]) -> dict[str, Any]:
-    """The attributes of a contact that state what a report of :func:`.verify.verify` found."""
+    """Return the attributes of a contact that state what a report of :func:`.verify.verify`
+    found."""
     distribution = report["distribution"]
     # few and flat: each attribute costs about a hundred bytes, and HDF5 keeps more than eight of a
     # group in a structure of its own, of several kilobytes

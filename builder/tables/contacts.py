@@ -84,28 +84,28 @@ class SolvedContact(NamedTuple):
         return surrogate.table.contacts[self.name]
 
     def as_asked(self, v: Array, y: Array) -> tuple[Array, Array]:
-        """The groups that evaluation makes of those of the contact as a whole, to the last digit,
-        which counts in the corner."""
+        """Return the groups that evaluation makes of those of the contact as a whole, to the last
+        digit, which counts in the corner."""
         scale = scale_of(self.kind)
         return scale * v / scale, scale * y / scale
 
     def places(self, surrogate: Surrogate, v: Array, y: Array) -> Codes:
-        """The blocks of points (n,), their number where a closed form answers."""
+        """Return the blocks of points (n,), their number where a closed form answers."""
         data = surrogate.tabulated.data("mu_ratio", self.kind)
         return kernels[-1].places(data, v, y, self.kind.contact)[0]
 
     def quantity(self, surrogate: Surrogate, name: str, v: Array, y: Array) -> Any:
-        """Value, bound and source of a table."""
+        """Return value, bound and source of a table."""
         scale = scale_of(self.kind)
         return surrogate.quantity(name, scale * v, scale * y, **self.kind.names)
 
     def slopes(self, surrogate: Surrogate, name: str, v: Array, y: Array) -> Array:
-        """Value, slopes and their bounds, rows (5, n)."""
+        """Return value, slopes and their bounds, rows (5, n)."""
         return slopes_of(surrogate, self.kind, name, v, y)
 
 
 def scale_of(kind: Kind) -> float:
-    """v~ and y~ of a contact over those of its charts."""
+    """Return v~ and y~ of a contact over those of its charts."""
     return SPRINGS_OF[CONTACTS[kind.contact]].middle_load
 
 
@@ -115,19 +115,19 @@ def draws_of(kind: Kind) -> Draws:
 
 
 def ratio_of(surrogate: Surrogate, kind: Kind, v: Array, y: Array) -> Array:
-    """mu~ of a table at points of the charts' groups."""
+    """Return mu~ of a table at points of the charts' groups."""
     scale = scale_of(kind)
     return np.asarray(surrogate.quantity("mu_ratio", scale * v, scale * y, **kind.names)[0])
 
 
 def slopes_of(surrogate: Surrogate, kind: Kind, name: str, v: Array, y: Array) -> Array:
-    """Value, slopes and their bounds there, rows (5, n)."""
+    """Return value, slopes and their bounds there, rows (5, n)."""
     scale = scale_of(kind)
     return np.array(surrogate.tabulated.slopes(name, scale * v, scale * y, kind))
 
 
 def spring(sweep: Sweep) -> SolvedContact:
-    """One spring, solved anew at every point."""
+    """Return one spring, solved anew at every point."""
 
     def solve(
         v: Array, y: Array, eta: Array | None = None, *, continuous: bool = False
@@ -147,7 +147,7 @@ def spring(sweep: Sweep) -> SolvedContact:
 
 
 def ball(springs: Springs, tolerance: float = FINE, workers: int = 1) -> SolvedContact:
-    """A ball, integrated over springs well below ``tolerance``."""
+    """Return a ball, integrated over springs well below ``tolerance``."""
     integral = Ball(springs, points_for(tolerance), workers)
 
     def solve(
@@ -179,6 +179,6 @@ def _ball_noise(
 
 
 def _no_noise(name: str, v: Array, y: Array, solution: dict[str, Array], sliding: Sliding) -> Array:
-    """A quadrature's own error is a part of the errors that a table of a ball states."""
+    """Return a quadrature's own error is a part of the errors that a table of a ball states."""
     del y, solution, sliding, name
     return np.zeros_like(v)

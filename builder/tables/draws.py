@@ -33,17 +33,17 @@ class Draws(NamedTuple):
     off_steps: Callable[[Array, Array], Array]
 
     def draw(self, case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Array]:
-        """``n`` points of one kind of :attr:`cases`."""
+        """Return ``n`` points of one kind of :attr:`cases`."""
         return self.cases[case][1](np.random.default_rng(seed), n, surrogate)
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> Array:
-    """``n`` random numbers from ``low`` to ``high``, uniform in their logarithm, (n,)."""
+    """Return ``n`` random numbers from ``low`` to ``high``, uniform in their logarithm, (n,)."""
     return 10.0 ** rng.uniform(math.log10(low), math.log10(high), n)
 
 
 def fast_from(s: Surrogate, y: Array) -> Array:
-    """v~ from which the closed form for large speed answers, y~ > Y_CONT."""
+    """Return v~ from which the closed form for large speed answers, y~ > Y_CONT."""
     below = atlas.RHO_MAX * s.v_tilde_crit(y)
     return np.asarray(np.where(y <= atlas.Y_TAIL, below, atlas.FAST_KAPPA * np.sqrt(y)))
 
@@ -129,7 +129,7 @@ def _common_sides(
 
 
 def _sides(surrogate: Surrogate, n: int, seed: int) -> Pairs:
-    """Those of every contact, and of the edge of the closed form."""
+    """Yield those of every contact, and of the edge of the closed form."""
     rng, (low, high) = np.random.default_rng(seed), SIDES
     yield from _common_sides(surrogate, rng, n, SEAMS, atlas.Y_STICK_HI)
     y = log_uniform(rng, atlas.Y_CONT, 1e8, n)
@@ -185,7 +185,7 @@ _BALL_CASES: dict[str, tuple[float, Draw]] = {
 
 
 def _ball_sides(surrogate: Surrogate, n: int, seed: int) -> Pairs:
-    """Those of every contact, and of the steepest ray."""
+    """Yield those of every contact, and of the steepest ray."""
     rng, (low, high) = np.random.default_rng(seed), SIDES
     yield from _common_sides(surrogate, rng, n, _BALL_SEAMS, STEEPEST_Y)
     y = log_uniform(rng, 1e-6, STEEPEST_Y, n)

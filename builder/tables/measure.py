@@ -65,7 +65,7 @@ def border_errors(border: Border, sweep: Sweep, rng: np.random.Generator, n: int
 def _stating(
     surrogate: Surrogate, contact: SolvedContact, error: float, of_border: float
 ) -> Surrogate:
-    """The same table with one error for all that it tabulates, and a share of the border's.
+    """Return the same table with one error for all that it tabulates, and a share of the border's.
 
     With the error 1 a bound is the scale of its errors; with 0 it is what it allows beside the
     table's error.
@@ -170,7 +170,8 @@ _TO_DERIVATIVE = chebyshev.chebvander(_AT, POINTS - 2) @ chebyshev.chebder(_TO_C
 
 
 def finer(shape: tuple[int, int]) -> tuple[int, int]:
-    """Numbers of nodes along both coordinates of the interpolant that stands for the model."""
+    """Return numbers of nodes along both coordinates of the interpolant that stands for the
+    model."""
     a, b = (n + max(6, n // 2) for n in shape)
     return a, b
 
@@ -204,8 +205,8 @@ class _CellPoints:
 def _difference(
     chart: Chart, block: Block, values: Array, exact: Array
 ) -> tuple[Array, _CellPoints, _CellPoints]:
-    """Cells through node ``values`` minus the interpolant with coefficients ``exact``, (cells a,
-    POINTS, cells b, POINTS)."""
+    """Return cells through node ``values`` minus the interpolant with coefficients ``exact``,
+    (cells a, POINTS, cells b, POINTS)."""
     a, b = (
         _CellPoints(axis, n, m)
         for axis, n, m in zip((chart.a, chart.b), block.cells, exact.shape, strict=True)
@@ -221,8 +222,8 @@ DEVIATIONS = 4.0
 
 
 def _without_noise(exact: Array, noise: Array) -> Array:
-    """Chebyshev coefficients of the interpolant through ``exact``, without those that are the
-    solver's rounding.
+    """Return Chebyshev coefficients of the interpolant through ``exact``, without those that are
+    the solver's rounding.
 
     At an edge a second derivative multiplies them by the fourth power of their number, which would
     hide what the table errs by.  They are those at the level of the last ones, and those that the
@@ -279,14 +280,14 @@ def cell_errors(
 
 
 def _truths(contact: SolvedContact, exact: Array, noise: Array) -> list[Array]:
-    """Chebyshev coefficients of the model: without what may be rounding; of a quadrature also all
-    of them, since its error is no rounding of the nodes."""
+    """Return Chebyshev coefficients of the model: without what may be rounding; of a quadrature
+    also all of them, since its error is no rounding of the nodes."""
     clean = _without_noise(exact, noise)
     return [clean, chebyshev_coefficients(exact)] if contact.quadrature else [clean]
 
 
 def _largest(contact: SolvedContact, index: int, block: Block, name: str, exact: Array) -> Array:
-    """A quantity's largest errors over every cell, (cells, 3)."""
+    """Return a quantity's largest errors over every cell, (cells, 3)."""
     chart, quantity = contact.charts[index], QUANTITIES[QUANTITY_NAMES.index(name)]
     off, a, b = _difference(chart, block, block.nodes[name], exact)
     along_a = np.einsum("irp,ipjq->irjq", a.to_derivative, off)

@@ -21,7 +21,7 @@ POINTS = 20_000
 
 
 def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
-    """The log-spaced grid for plots; finer for finer tables, nodes solved, not interpolated.
+    """Return the log-spaced grid for plots; finer for finer tables, nodes solved, not interpolated.
 
     mu~ and the stick fraction keep as many digits as the table's tolerance needs;
     ``error_estimate`` is the solver's and that of the rounding.
@@ -49,7 +49,8 @@ def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
 
 
 def interpolation_errors(table: Table, sweep: Sweep, seed: int = 2018) -> dict[str, float]:
-    """The attributes of the root that state what tools err by that interpolate the plain grid.
+    """Return the attributes of the root that state what tools err by that interpolate the plain
+    grid.
 
     Linear and bicubic over ln v~ and ln y~, by scipy; median and 99 % at log-uniform points, the
     largest error at these and along the least v~.

@@ -62,5 +62,5 @@ SOLVED = {
 def solver_noise(
     name: str, v: Array, y: Array, solution: dict[str, Array], sliding: Sliding
 ) -> Array:
-    """What fresh solves of a quantity may be wrong by, absolute."""
+    """Return what fresh solves of a quantity may be wrong by, absolute."""
     return SOLVED[name].noise(v, y, solution[name], sliding)

@@ -24,13 +24,13 @@ def bits(tolerance: float) -> int:
 
 
 def to_step(values: Array, tolerance: float) -> Array:
-    """``values`` at multiples of a power of two; none moves by more than half of
+    """Return ``values`` at multiples of a power of two; none moves by more than half of
     ``tolerance``/:data:`STEPS`."""
     return np.asarray(np.ldexp(np.round(np.ldexp(values, bits(tolerance))), -bits(tolerance)))
 
 
 def to_bits(values: Array, digits: int, away_from_zero: bool = False) -> Array:
-    """``values`` with ``digits`` binary digits each, to the nearest or away from zero."""
+    """Return ``values`` with ``digits`` binary digits each, to the nearest or away from zero."""
     mantissa, exponent = np.frexp(values)
     multiple = np.ldexp(mantissa, digits)
     whole = (
@@ -40,7 +40,7 @@ def to_bits(values: Array, digits: int, away_from_zero: bool = False) -> Array:
 
 
 def round_block(block: Block, tolerance: float) -> Block:
-    """``block`` with its node values rounded.
+    """Return ``block`` with its node values rounded.
 
     All that a block tabulates is of order one, and mu~ changes by at most about as much as what is
     tabulated: a step that is the same for all values of a block suits the relative error of mu~

@@ -52,8 +52,8 @@ def seam_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7, kind: Kind = 
 def seam_slope_jumps(
     surrogate: Surrogate, n: int = 2000, seed: int = 7, kind: Kind = SPRING
 ) -> float:
-    """The same for v~ d mu~/d v~ and y~ d mu~/d y~, absolute [-]; next to the border both are
-    continuous, too."""
+    """Return the same for v~ d mu~/d v~ and y~ d mu~/d y~, absolute [-]; next to the border both
+    are continuous, too."""
     sides = (
         [slopes_of(surrogate, kind, "mu_ratio", v, y)[1:3] for v, y in ((v1, y1), (v2, y2))]
         for v1, v2, y1, y2 in draws_of(kind).sides(surrogate, n, seed)
@@ -131,7 +131,7 @@ class _Comparison(NamedTuple):
 
 
 def bound_over_error(bound: Array, noise: Array, difference: Array) -> Array:
-    """What :class:`_Comparison` has as ``over``."""
+    """Return what :class:`_Comparison` has as ``over``."""
     with np.errstate(all="ignore"):
         return np.where(difference > noise, (bound + noise) / difference, np.nan)
 
@@ -158,7 +158,7 @@ def _values(
 def _slopes(
     surrogate: Surrogate, contact: SolvedContact, around: Neighbours, name: str
 ) -> _Comparison:
-    """The logarithmic slopes, both of each point."""
+    """Return the logarithmic slopes, both of each point."""
     (truth, noise), (v, y) = around.slopes(name), (around.v, around.y)
     source = contact.quantity(surrogate, "mu_ratio", v, y)[2]
     _, along_v, along_y, *bounds = contact.slopes(surrogate, name, v, y)
@@ -183,7 +183,7 @@ def _summary(comparison: _Comparison, at: Any = slice(None)) -> dict[str, Any]:
 
 
 def _report(parts: list[_Comparison]) -> dict[str, Any]:
-    """All together, and by source."""
+    """Return all together, and by source."""
     whole = _Comparison(*(np.concatenate(column) for column in zip(*parts, strict=True)))
     names = sorted((SOURCES[code], code) for code in np.unique(whole.source))
     return {
@@ -257,7 +257,7 @@ def uncovered(report: dict[str, Any]) -> dict[str, int]:
 
 
 def holds(report: dict[str, Any], tolerance: float) -> bool:
-    """Whether a report of :func:`verify` keeps the tolerance and every bound."""
+    """Return whether a report of :func:`verify` keeps the tolerance and every bound."""
     errors = (
         report["max_abs_error"] <= tolerance and report["max_rel_error"] <= ABS_TO_REL * tolerance
     )

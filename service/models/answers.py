@@ -22,7 +22,7 @@ Numbers: TypeAlias = list[float | None]
 
 
 def quantity(text: str, unit: str, default: Any = ...) -> Any:
-    """A member with its meaning and unit."""
+    """Return a member with its meaning and unit."""
     return Field(default, description=f"{text} [{unit}]", json_schema_extra={"x-unit": unit})
 
 
@@ -31,7 +31,8 @@ def _described(member: Member, default: Any = ...) -> Any:
 
 
 def member(path: str, default: Any = ...) -> Any:
-    """A value of an output, with the unit and the meaning that the library's list gives it."""
+    """Return a value of an output, with the unit and the meaning that the library's list gives
+    it."""
     return _described(MEMBERS[path], default)
 
 
@@ -143,7 +144,7 @@ _UNDERSTOOD = "Only if requested: what was understood of each input"
 
 
 def understood_inputs() -> Any:
-    """The member of an answer with what was understood."""
+    """Return the member of an answer with what was understood."""
     return Field(None, description=_UNDERSTOOD)
 
 

@@ -68,12 +68,12 @@ NULL = {"type": "null"}
 
 
 def optional(description: str, **more: Any) -> Any:
-    """A member that may be left out; null says the same, but for a query, which has none."""
+    """Return a member that may be left out; null says the same, but for a query, which has none."""
     return Field(None, description=description, json_schema_extra=_or_null, **more)
 
 
 def either(description: str, **more: Any) -> Any:
-    """A member that another one may stand for; null is refused."""
+    """Return a member that another one may stand for; null is refused."""
     return Field(None, description=description, json_schema_extra=without_null, **more)
 
 
@@ -109,22 +109,22 @@ _AMPLITUDE = described("Fz_amplitude", ": for direction normal in place of y0")
 
 
 def _given_together(*names: str) -> dict[str, Any]:
-    """The schema of members that are all given: there, and no null."""
+    """Return the schema of members that are all given: there, and no null."""
     return {"required": [*names], "properties": {name: {"not": NULL} for name in names}}
 
 
 def one_of(*names: str) -> dict[str, Any]:
-    """The schema of alternatives: exactly one of these members is given."""
+    """Return the schema of alternatives: exactly one of these members is given."""
     return {"oneOf": [_given_together(name) for name in names]}
 
 
 def not_both(one: str, other: str) -> dict[str, Any]:
-    """The schema of two members of which one at most is given."""
+    """Return the schema of two members of which one at most is given."""
     return {"not": _given_together(one, other)}
 
 
 def both_or_none(one: str, other: str) -> dict[str, Any]:
-    """The schema of two members of which each needs the other."""
+    """Return the schema of two members of which each needs the other."""
     neither = {"not": {"anyOf": [_given_together(one), _given_together(other)]}}
     return {"anyOf": [_given_together(one, other), neither]}
 
@@ -195,7 +195,7 @@ class OtherInputs(Strict):
 
 
 def _given(model: BaseModel) -> dict[str, Any]:
-    """The inputs that are given, by name; an interval in k by both of its ends."""
+    """Return the inputs that are given, by name; an interval in k by both of its ends."""
     values = model.__dict__
     inputs = {name: values[name] for name in INPUTS if values.get(name) is not None}
     return inputs | stiffness_inputs(inputs.pop("k")) if type(inputs.get("k")) is str else inputs
@@ -220,19 +220,19 @@ _NO_TEXTS = "must be numbers: a column has no texts; a text with a unit is for o
 
 
 def is_rigid(value: object) -> bool:
-    """Whether a value is the word for a stiffness without limit."""
+    """Return whether a value is the word for a stiffness without limit."""
     return isinstance(value, str) and value.strip().lower() == RIGID
 
 
 def not_a_number(name: str, value: object) -> str:
-    """Why a value that is no number is refused where programs send numbers."""
+    """Return why a value that is no number is refused where programs send numbers."""
     if name == "k" and isinstance(value, str):
         return "must be a number, or the word rigid, and no other text"
     return no_number(name, value)
 
 
 def entry(name: str, value: object) -> tuple[float, str | None]:
-    """The number of an input and None, or NaN and the reason why there is none."""
+    """Return the number of an input and None, or NaN and the reason why there is none."""
     if name == "k" and is_rigid(value):
         return math.inf, None
     if type(value) not in _NUMBERS:
@@ -247,7 +247,7 @@ def entry(name: str, value: object) -> tuple[float, str | None]:
 
 
 def column(name: str, values: Sequence[Any]) -> Column:
-    """A list as a column.  A number beyond double range is never a rigid contact."""
+    """Return a list as a column. A number beyond double range is never a rigid contact."""
     if _NUMBERS.issuperset(map(type, values)):
         try:
             array = np.array(values, np.float64)
@@ -269,7 +269,7 @@ _ALWAYS = ("mu0", "Fz", "k", "v0")  # where null is refused
 
 
 def cells(name: str, value: Any) -> float | Column | None:
-    """A number for all cases, or a list or an array with one for each."""
+    """Return a number for all cases, or a list or an array with one for each."""
     if isinstance(value, list):
         return column(name, value)
     if isinstance(value, np.ndarray):
@@ -297,8 +297,8 @@ def _one_word(value: Any, info: ValidationInfo) -> Any:
 
 
 def _or_listed(one: dict[str, Any], *texts: dict[str, Any]) -> WithJsonSchema:
-    """One number for all cases, which ``texts`` describe, too, or a list of any, where a bad entry
-    spoils its case only."""
+    """Return one number for all cases, which ``texts`` describe, too, or a list of any, where a bad
+    entry spoils its case only."""
     several = {"type": "array", "items": {"anyOf": [one, {"type": "string"}, NULL]}}
     return WithJsonSchema({"anyOf": [one, *texts, several]})
 

@@ -81,7 +81,8 @@ _Text = Annotated[str, WithJsonSchema(text_schema("length", False))]
 
 
 def _of_its_form(value: Any, _: Any, info: ValidationInfo) -> Any:
-    """The oscillation as the library takes it; a union would report the faults of every form."""
+    """Return the oscillation as the library takes it; a union would report the faults of every
+    form."""
     name = info.field_name or ""
     if isinstance(value, str):
         try:
@@ -103,7 +104,7 @@ def _of_its_form(value: Any, _: Any, info: ValidationInfo) -> Any:
 
 
 def _pair_of_numbers(name: str, pair: list[Any]) -> list[Any]:
-    """An amplitude and its phase as numbers, where they are texts."""
+    """Return an amplitude and its phase as numbers, where they are texts."""
     numbers = [*pair]
     for i, kind in enumerate((QUANTITY_OF[name], "angle")[: len(pair)]):
         if isinstance(pair[i], str):
@@ -112,7 +113,7 @@ def _pair_of_numbers(name: str, pair: list[Any]) -> list[Any]:
 
 
 def _number(name: str, text: str, kind: str, place: tuple[str | int, ...]) -> float:
-    """The number of a text in SI, refused at its place within the oscillation."""
+    """Return the number of a text in SI, refused at its place within the oscillation."""
     try:
         return read_one(name, text, kind)
     except InputError as error:
@@ -121,7 +122,8 @@ def _number(name: str, text: str, kind: str, place: tuple[str | int, ...]) -> fl
 
 
 def _with_numbers(name: str, part: dict[str, Any], place: tuple[int, ...]) -> dict[str, Any]:
-    """A part with numbers for amplitude and phase that are texts, such as "2um" and "90 deg"."""
+    """Return a part with numbers for amplitude and phase that are texts, such as "2um" and "90
+    deg"."""
     numbers = dict(part)
     for member, kind in (("amplitude", QUANTITY_OF[name]), ("phase", "angle")):
         if isinstance(part.get(member), str):
@@ -139,8 +141,8 @@ FORMS = (
 
 
 def cost_of(contact: str, *parts: Any) -> float:
-    """The cost of a motion, see :mod:`service.admission`: each term is followed through every turn
-    of the highest harmonic."""
+    """Return the cost of a motion, see :mod:`service.admission`: each term is followed through
+    every turn of the highest harmonic."""
     terms = [one for part in parts if isinstance(part, list) for one in part]
     plain = sum(isinstance(part, (float, tuple)) for part in parts)
     highest: int = max([1, *(harmonic for harmonic, *_ in terms)])

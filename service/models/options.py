@@ -69,7 +69,7 @@ class Choice(Strict):
 
 
 def _deviation(name: str, more: str = "") -> str:
-    """What a deviation is, in the unit of its input."""
+    """Return what a deviation is, in the unit of its input."""
     return f"Standard deviation of {name} [{unit_of(name)}], of independent errors{more}"
 
 

@@ -242,7 +242,7 @@ class StiffnessRequest(Strict):
 
 
 def _of_points(value: Any, info: ValidationInfo) -> Any:
-    """A number or a text, or an array of them, as an array in SI; the word rigid in k is
+    """Return a number or a text, or an array of them, as an array in SI; the word rigid in k is
     infinite."""
     name = info.field_name or ""
     entries = value if isinstance(value, list) else [value]
@@ -261,7 +261,7 @@ def _of_points(value: Any, info: ValidationInfo) -> Any:
 
 
 def _of_point(name: str, value: Any) -> tuple[float, str | None]:
-    """One number in SI, or the reason why it is none."""
+    """Return one number in SI, or the reason why it is none."""
     if type(value) not in (int, float, str):
         return math.nan, no_number(name, value)
     try:

@@ -29,12 +29,12 @@ OR_ONE = BeforeValidator(lambda value: [value] if isinstance(value, str) else va
 
 
 def fault(reason: str) -> PydanticCustomError:
-    """The error of a value, in the words of the library."""
+    """Return the error of a value, in the words of the library."""
     return PydanticCustomError("input", "{reason}", {"reason": reason})
 
 
 def _checked(value: Any, number: Callable[[Any], float], info: ValidationInfo) -> Any:
-    """A number as it is, and a text that the library can read."""
+    """Return a number as it is, and a text that the library can read."""
     if type(value) is not str:
         return number(value)
     name = (info.field_name or "").removeprefix("std_")
@@ -48,7 +48,8 @@ def _checked(value: Any, number: Callable[[Any], float], info: ValidationInfo) -
 
 
 def _in_si(value: Any, number: Callable[[Any], float], info: ValidationInfo) -> Any:
-    """A number in SI from a number or a text, where deviations and intervals mean nothing."""
+    """Return a number in SI from a number or a text, where deviations and intervals mean
+    nothing."""
     if type(value) is not str:
         return number(value)
     _checked(value, number, info)
@@ -59,7 +60,7 @@ def _in_si(value: Any, number: Callable[[Any], float], info: ValidationInfo) -> 
 
 
 def text_schema(quantity: str, positive: bool) -> dict[str, Any]:
-    """The JSON Schema of a text, for clients: the library reads more than its pattern."""
+    """Return the JSON Schema of a text, for clients: the library reads more than its pattern."""
     digits = r"[1-9][0-9]{0,8}" if positive else r"[0-9]{1,9}"
     about = QUANTITIES[quantity]
     units = about.such_as.replace(":", ",").replace(";", ",").split(", ")
@@ -129,7 +130,7 @@ Ratio = Annotated[
 
 
 def stiffness_inputs(k: str) -> dict[str, Any]:
-    """The inputs that a checked text gives: k, infinite where rigid, or both ends of it."""
+    """Return the inputs that a checked text gives: k, infinite where rigid, or both ends of it."""
     one = read("k", k)
     if one.low is not None:
         return dict(zip(ENDS, (one.low, one.high), strict=True))

@@ -17,7 +17,7 @@ from ..reading import DirectRoute
 def router_of(
     tag: str, route_class: type[APIRoute] = DirectRoute, prefix: str = "/v1"
 ) -> APIRouter:
-    """A router whose operations have the names of their functions."""
+    """Return a router whose operations have the names of their functions."""
     return APIRouter(
         prefix=prefix,
         tags=[tag],
@@ -40,7 +40,7 @@ _RETRY = {
 
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """The descriptions of problems with these statuses, for ``responses``."""
+    """Return the descriptions of problems with these statuses, for ``responses``."""
     return {
         status: {
             "description": "; ".join(kind.title for kind in ProblemKind if kind.status == status),
@@ -80,8 +80,8 @@ SMALL = 100_000  # bytes; the page's own files and libraries are smaller
 def file_answer(
     request: Request, path: Path, headers: Mapping[str, str], **options: Any
 ) -> Response:
-    """A file, the part of it that Range requests, or 304 if the client has it already; OSError if
-    it is gone.
+    """Return a file, the part of it that Range requests, or 304 if the client has it already;
+    OSError if it is gone.
 
     The ETag is that of the headers, or is made from the size and the modification time.
     """

@@ -100,13 +100,14 @@ class _Answer(Response):
 
 
 def _by_one(text: bytearray) -> float:
-    """The cost of reading what Python may have to read one by one; a null has two of its l."""
+    """Return the cost of reading what Python may have to read one by one; a null has two of its
+    l."""
     words = (count(text, b'"') + count(text, b"l")) / 2
     return _ROW * count(text, b"{") + _WORD * words
 
 
 def _gathered(pieces: Iterator[bytes], least: float) -> Iterator[bytes]:
-    """The same bytes in pieces of at least so many."""
+    """Yield the same bytes in pieces of at least so many."""
     parts, size = list[bytes](), 0
     for piece in pieces:
         parts.append(piece)

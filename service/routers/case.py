@@ -36,7 +36,7 @@ _CACHED: Any = {
 
 
 async def _answered(request: Request, case: CaseRequest) -> dict[str, Any]:
-    """The answer to a case."""
+    """Return the answer to a case."""
     state, inputs = request.app.state, case.inputs
     table = state.tables.pick(case.tolerance)
     more: dict[str, Any] = {}
@@ -61,7 +61,7 @@ async def _answered(request: Request, case: CaseRequest) -> dict[str, Any]:
 
 
 def _of_model(answer: Answer[float]) -> dict[str, Any]:
-    """Rows of docs/validity.md on this case, and the digits that k supports."""
+    """Return rows of docs/validity.md on this case, and the digits that k supports."""
     effect = effect_of(answer)
     return {MODEL: rows_of(answer, effect), "digits": digits(effect)}
 

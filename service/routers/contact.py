@@ -67,7 +67,7 @@ async def post_fit(request: Request, measured: FitRequest) -> Response:
 
 
 def _points(member: str, data: bytes, measured: FitRequest) -> Table:
-    """The points of a table; a request has what is wrong with its lines at ``member``."""
+    """Return the points of a table; a request has what is wrong with its lines at ``member``."""
     try:
         if data.startswith(WORKBOOK):  # a few kB of it may unpack to any size
             raise TextError("it is a workbook, or another zip file: save it as CSV")

@@ -37,26 +37,26 @@ def _page(request: Request, path: Path, policy: str) -> Response:
 
 @router.get("/")
 async def page(request: Request) -> Response:
-    """The page."""
+    """Return the page."""
     return _page(request, STATIC / "page" / "index.html", POLICY)
 
 
 @router.get("/docs")
 async def docs(request: Request) -> Response:
-    """The description."""
+    """Return the description."""
     return _page(request, STATIC / "swagger-ui" / "index.html", _DOCS_POLICY)
 
 
 @router.get("/static/page/names.json")
 async def get_names(request: Request) -> Response:
-    """The library's inputs, units and bounds, and the geometries of a contact."""
+    """Return the library's inputs, units and bounds, and the geometries of a contact."""
     built = request.app.state.settings.guide is not None or not _DOCUMENTS
     return Json(names(built), headers=_FRESH)
 
 
 @router.get("/static/page/map.json")
 async def get_map(request: Request) -> Response:
-    """The data of the map of a contact and a direction, see ``page_data.map_of``."""
+    """Return the data of the map of a contact and a direction, see ``page_data.map_of``."""
     surrogate = request.app.state.tables.pick().surrogate
     words = [request.query_params.get(name, word) for name, word in SPRING.names.items()]
     kind = kind_of(*words)
@@ -85,7 +85,7 @@ OPEN = ("/", "/docs", "/static/page/names.json", *_FILES, *_DOCUMENTS)
 
 @router.get("/static/{folder}/{name}")
 async def get_asset(request: Request, folder: str, name: str) -> Response:
-    """A script or a style sheet."""
+    """Return a script or a style sheet."""
     path = _FILES.get(f"/static/{folder}/{name}")
     if path is None:
         raise HTTPException(404)
@@ -95,7 +95,7 @@ async def get_asset(request: Request, folder: str, name: str) -> Response:
 
 @router.get("/documents/{name:path}")
 async def get_document(request: Request, name: str) -> Response:
-    """A page of the documents as it is written."""
+    """Return a page of the documents as it is written."""
     path = _DOCUMENTS.get(f"/documents/{name}")
     if path is None:
         raise HTTPException(404)

@@ -42,7 +42,7 @@ router = router_of("answers")
 
 
 def _law(question: LawRequest, table: LoadedTable) -> tuple[Law, dict[str, list[Any]]]:
-    """The library's law and all columns beside the swept input."""
+    """Return the library's law and all columns beside the swept input."""
     case, along, (start, stop) = question.inputs, question.along, question.ends
     _refuse_model(question)
     law = mumacro.law(
@@ -77,7 +77,7 @@ def _answer_at(
     values: Array,
     stiffening: Stiffening | None,
 ) -> Answer[Any]:
-    """The answers at values of one input, with what is included."""
+    """Return the answers at values of one input, with what is included."""
     inputs = {name: value for name, value in question.inputs.items() if value is not None}
     inputs[unknown] = values
     if stiffening is not None:
@@ -153,7 +153,7 @@ _BESIDE = {"mu_static": "-", "k": "N/m"}
 
 
 def unit_at(path: str) -> str:
-    """The unit of a column of a law."""
+    """Return the unit of a column of a law."""
     return _BESIDE[path] if path in _BESIDE else MEMBERS[path].unit
 
 
@@ -179,7 +179,7 @@ async def post_solve_for(request: Request, question: SolveForRequest) -> Respons
 
 
 def _solved_motion(question: SolveForRequest) -> dict[str, Any]:
-    """The roots over a motion, which reads no table."""
+    """Return the roots over a motion, which reads no table."""
     motion, of = question.motion, question.of or "mu_macro"
     unit = _unit_of_target(question)
     solution = mumacro.solve_motion(
@@ -196,7 +196,7 @@ def _solved_motion(question: SolveForRequest) -> dict[str, Any]:
 
 
 def _unit_of_target(question: SolveForRequest) -> float:
-    """What a target is a multiple of: mu0, or 1."""
+    """Return what a target is a multiple of: mu0, or 1."""
     if question.quantity == "mu_macro":
         return 1.0
     if question.unknown == "mu0" or question.mu0 is None:
@@ -231,8 +231,8 @@ def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
 
 
 def _in_quantity(question: SolveForRequest, answer: dict[str, Any], unit: float) -> dict[str, Any]:
-    """The library's answer with targets, and what is reachable, in the quantity that was asked
-    for."""
+    """Return the library's answer with targets, and what is reachable, in the quantity that was
+    asked for."""
     _with_targets(question, answer["results"])
     reach = answer["reachable"]
     return answer | {"reachable": reach | {end: reach[end] / unit for end in ("min", "max")}}
@@ -248,7 +248,7 @@ def _with_targets(question: SolveForRequest, results: list[dict[str, Any]]) -> N
 def _included(
     question: SolveForRequest, table: LoadedTable, unknown: str, solution: TableSolution
 ) -> list[dict[str, Any]]:
-    """The included quantities of every root, in order."""
+    """Return the included quantities of every root, in order."""
     values = np.array([root.value for roots in solution.roots for root in roots])
     if not (question.outputs or question.deviations) or not values.size:
         return [{}] * values.size

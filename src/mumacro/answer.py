@@ -239,8 +239,8 @@ class Answer(Result, Generic[Number]):
         return self.notes_in({})
 
     def notes_in(self, units: Mapping[str, str]) -> list[Note]:
-        """:attr:`notes`, with a value in the unit that ``units`` has for its input, as it was
-        typed."""
+        """Return :attr:`notes`, with a value in the unit that ``units`` has for its input, as it
+        was typed."""
         if not self._has_cases:
             return [*self.notes_on_outputs]
         cases = self.cases
@@ -250,8 +250,8 @@ class Answer(Result, Generic[Number]):
     # --- other forms ------------------------------------------------------------------------------
 
     def plot(self, ax: Any = None) -> Any:
-        """The cases on the map of mu~ of their contact and direction, by regime, with the border of
-        continuous sliding; needs matplotlib.
+        """Return the cases on the map of mu~ of their contact and direction, by regime, with the
+        border of continuous sliding; needs matplotlib.
 
         A rigid contact, and whatever else lies beyond the map, stands at its edge with a word that
         says why; an interval of k is a line through its middle.  ``ax`` are axes of matplotlib, or
@@ -262,7 +262,7 @@ class Answer(Result, Generic[Number]):
         return self._surrogate.draw_map(ax, kind, title, marks=self._on_map())
 
     def _title(self) -> str:
-        """The answer to one case with the digits of a picture, and the case."""
+        """Return the answer to one case with the digits of a picture, and the case."""
         cases, case = self.cases, dict[str, Any](self.cases.columns)
         if cases.ends is not None:
             case["k"] = [float(end[0]) for end in cases.ends]
@@ -272,7 +272,7 @@ class Answer(Result, Generic[Number]):
         return rf"$\mu_\mathrm{{macro}}$ = {self.mu_macro:.4g}{band}; {words}"
 
     def _on_map(self) -> plotting.Marks:
-        """The cases as marks of the map."""
+        """Return the cases as marks of the map."""
         cases = self.cases
         groups = self._groups or self._surrogate.answer(cases, groups=True)._groups
         v, y = (np.ravel(np.asarray(x, np.float64)) for x in groups[:2])
@@ -306,7 +306,7 @@ class Answer(Result, Generic[Number]):
         return {path: self[path] for path in self.paths}
 
     def _members(self) -> dict[str, Any]:
-        """What is in the JSON of one case: ``power.saved`` is ``saved`` within ``power``.
+        """Return what is in the JSON of one case: ``power.saved`` is ``saved`` within ``power``.
 
         >>> from mumacro import Surrogate
         >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=20e3, v0=0.01)
@@ -340,7 +340,7 @@ class Answer(Result, Generic[Number]):
         return [(path, cell(x)) for path, x in self.columns.items()] if self._is_one() else None
 
     def _in_full(self) -> tuple[str, Rows | None, list[str]]:
-        """Of one case what the command prints."""
+        """Return what the command prints of one case."""
         if not self._is_one():
             return super()._in_full()
         rows, notes, error = self._surrogate.in_words(self)
@@ -351,14 +351,14 @@ _NOTHING: dict[str, Any] = {}
 
 
 def _ray(columns: Mapping[str, Any], amplitude: str, size: int) -> Any:
-    """y0 omega / v0, (size,): y~/v~ of a rigid contact, too."""
+    """Return y0 omega / v0, (size,): y~/v~ of a rigid contact, too."""
     with np.errstate(all="ignore"):
         ratio = columns[amplitude] * np.asarray(columns["omega"]) / columns["v0"]
     return np.broadcast_to(ratio, size)
 
 
 def _edge_words(columns: Mapping[str, Any], amplitude: str, v: Any, y: Any) -> Any:
-    """Why cases (n,) stand at the edge of the map; empty for those on it."""
+    """Return why cases (n,) stand at the edge of the map; empty for those on it."""
     with np.errstate(invalid="ignore"):
         at_v, at_y = plotting.on_map(v, y, np.ones_like(v), amplitude == AMPLITUDE)
         beyond = (at_v != v) | (at_y != y)
@@ -389,7 +389,7 @@ if TYPE_CHECKING:
 
 
 def nested(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values by path as JSON has them.
+    """Return values by path as JSON has them.
 
     >>> nested({"mu_macro": 0.2, "power.saved": 1.0, "power.oscillation": 2.0})
     {'mu_macro': 0.2, 'power': {'saved': 1.0, 'oscillation': 2.0}}

@@ -39,7 +39,7 @@ def _float(x: ArrayLike) -> Array:
 
 @np.errstate(all="ignore")
 def agm(b: ArrayLike) -> Any:
-    """Arithmetic-geometric mean of 1 and ``b`` >= 1 [-], to rounding."""
+    """Return arithmetic-geometric mean of 1 and ``b`` >= 1 [-], to rounding."""
     a, g = np.ones(np.shape(b)), _float(b)
     while np.any(np.abs(a - g) > 1e-8 * a):
         a, g = 0.5 * (a + g), np.sqrt(a) * np.sqrt(g)
@@ -48,7 +48,7 @@ def agm(b: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def outer(r: ArrayLike) -> Any:
-    """(2/pi) K(i r) with r = y~/v~ [-], eqs. (35), (37): rigid contact, and the limit v~ ->
+    """Return (2/pi) K(i r) with r = y~/v~ [-], eqs. (35), (37): rigid contact, and the limit v~ ->
     infinity at fixed r.
 
     K is the complete elliptic integral of the first kind by its modulus, eq. (36).
@@ -65,7 +65,7 @@ def outer(r: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def second_order(r: ArrayLike) -> Any:
-    """Coefficient of 1/v~^2 at fixed r = y~/v~ [-], the first correction to eq. (35).
+    """Return coefficient of 1/v~^2 at fixed r = y~/v~ [-], the first correction to eq. (35).
 
     With D = 1 + r^2 cos^2 tau it is r^2 <sin^2 tau (1/2 - r^2 cos^2 tau) D^(-7/2)>, from the slow
     manifold of eq. (11) to second order, reduced to complete elliptic integrals.  The error of (35)
@@ -78,8 +78,8 @@ def second_order(r: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def static_limit(y: ArrayLike) -> Any:
-    """mu~ for v~ -> 0 [-]: sqrt(1 - y~^2) for y~ < 1, else 0, eqs. (16), (38).  Exact; error O(v~)
-    for y~ != 1.
+    """Return mu~ for v~ -> 0 [-]: sqrt(1 - y~^2) for y~ < 1, else 0, eqs. (16), (38). Exact; error
+    O(v~) for y~ != 1.
 
     >>> float(static_limit(0.6))
     0.8
@@ -90,8 +90,8 @@ def static_limit(y: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def small_angle(v: ArrayLike, y: ArrayLike) -> Any:
-    """mu~ of continuous sliding for y~ << 1 [-]: <cos(kappa cos tau)>, kappa = y~ / sqrt(1 + v~^2),
-    eqs. (29), (30).
+    """Return mu~ of continuous sliding for y~ << 1 [-]: <cos(kappa cos tau)>, kappa = y~ / sqrt(1 +
+    v~^2), eqs. (29), (30).
 
     This is the Bessel function J0(kappa), here by the trapezoidal rule on 32 points, to rounding
     for kappa <= 10. Off by 0.05 % (y~ = 0.3), 0.37 % (0.5), 4.8 % (1), always at the border.
@@ -104,7 +104,7 @@ def small_angle(v: ArrayLike, y: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def small_amplitude(v: ArrayLike, y: ArrayLike) -> Any:
-    """mu~ of continuous sliding for y~ << 1 [-]: 1 - y~^2 / (4 (1 + v~^2)), eq. (31).  Error
+    """Return mu~ of continuous sliding for y~ << 1 [-]: 1 - y~^2 / (4 (1 + v~^2)), eq. (31). Error
     O(y~^4).
 
     Off by 0.06 % (y~ = 0.3), 0.47 % (0.5), 6.3 % (1), always at the border.  Meaningless in
@@ -115,7 +115,8 @@ def small_amplitude(v: ArrayLike, y: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def continuous(v: ArrayLike, y: ArrayLike) -> Any:
-    """(2/pi) K(i y~ / sqrt(1 + v~^2)) [-]: this project's one formula for continuous sliding.
+    """Return (2/pi) K(i y~ / sqrt(1 + v~^2)) [-]: this project's one formula for continuous
+    sliding.
 
     Eq. (31) for y~ -> 0 and eq. (35) for v~ -> infinity, both with their order of error; off by
     less than 0.0401 in all of continuous sliding.  Meaningless in stick-slip.
@@ -125,7 +126,7 @@ def continuous(v: ArrayLike, y: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def critical(y: ArrayLike) -> Any:
-    """mu~ at the border for y~ << 1 [-]: 1 - y~^2 / 4, eqs. (32), (40).
+    """Return mu~ at the border for y~ << 1 [-]: 1 - y~^2 / 4, eqs. (32), (40).
 
     Too low by 0.07 % (y~ = 0.3), 0.55 % (0.5), 9.2 % (1).
     """
@@ -134,8 +135,8 @@ def critical(y: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def critical_next(y: ArrayLike) -> Any:
-    """mu~ at the border with one term more than eq. (32) [-]: 1 - y~^2 / 4 + (5/64) y~^4.  Error
-    O(y~^6).
+    """Return mu~ at the border with one term more than eq. (32) [-]: 1 - y~^2 / 4 + (5/64) y~^4.
+    Error O(y~^6).
 
     Off by -0.0023 % (y~ = 0.3), -0.035 % (0.5), -0.14 % (0.7), +0.24 % (1).
     """
@@ -148,8 +149,8 @@ def critical_next(y: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def master_curve(x: ArrayLike) -> Any:
-    """(mu~ - static) / (critical - static) at x = v~/v~crit for y~ << 1 [-], eq. (28); NaN for x >
-    1.
+    """Return (mu~ - static) / (critical - static) at x = v~/v~crit for y~ << 1 [-], eq. (28); NaN
+    for x > 1.
 
     1 - [(3/4)(x - 1)^2 + (1/4)(x - 1)^4] is a fit to :func:`master_curve_limit`, too low by up to
     0.0144 (x = 0.104); against the model too low by up to 0.0142 (y~ = 0.1), 0.0166 (0.5), 0.125
@@ -167,8 +168,8 @@ def master_curve(x: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def master_curve_limit(x: ArrayLike) -> Any:
-    """Limit of the master curve for y~ -> 0, exact [-]: N_0(x), of which eq. (28) is a fit; 1 for x
-    >= 1.
+    """Return limit of the master curve for y~ -> 0, exact [-]: N_0(x), of which eq. (28) is a fit;
+    1 for x >= 1.
 
     The foot is pulled at the speed x under a limit cos t and sticks from t1 to t2: cos t1 = x (t1 <
     0), sin t2 - sin t1 = x (t2 - t1), an equation like Kepler's.  With D = t2 - t1
@@ -200,7 +201,7 @@ def master_curve_limit(x: ArrayLike) -> Any:
 
 
 def _minus_sine(d: Any) -> Any:
-    """D - sin d without cancellation."""
+    """Return D - sin d without cancellation."""
     q = d * d
     series = (
         d * q / 6.0 * (1 - q / 20 * (1 - q / 42 * (1 - q / 72 * (1 - q / 110 * (1 - q / 156)))))
@@ -213,7 +214,8 @@ def _minus_sine(d: Any) -> Any:
 
 @np.errstate(all="ignore")
 def border_23(y: ArrayLike) -> Any:
-    """v~crit for y~ << 1 [-]: the root of y~^2 = 2 v~ (1 + v~^2) (sqrt(1 + v~^2) + v~), eq. (23).
+    """Return v~crit for y~ << 1 [-]: the root of y~^2 = 2 v~ (1 + v~^2) (sqrt(1 + v~^2) + v~), eq.
+    (23).
 
     With v~ = d / (2 sqrt(1 + d)) it is the cubic d (d + 2)^2 = 4 y~^2 (1 + d), solved by Newton's
     method. Off by -1.2 % (y~ = 0.5), +0.7 % (1), +12 % (2).
@@ -231,7 +233,7 @@ def border_23(y: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def border_24(y: ArrayLike) -> Any:
-    """v~crit for y~ << 1 [-]: sqrt(1/4 + y~^2/2) - 1/2, eqs. (24), (39).
+    """Return v~crit for y~ << 1 [-]: sqrt(1/4 + y~^2/2) - 1/2, eqs. (24), (39).
 
     Off by -0.4 % (y~ = 0.3), +0.4 % (0.5), +12.6 % (1), +61 % (2).
 
@@ -245,14 +247,15 @@ def border_24(y: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def border_26(y: ArrayLike) -> Any:
-    """v~crit for y~ >> 1 [-]: sqrt(y~ / 4.5), eq. (26).  Off by -1.08 % for y~ -> infinity, -5 % at
-    y~ = 2.25."""
+    """Return v~crit for y~ >> 1 [-]: sqrt(y~ / 4.5), eq. (26). Off by -1.08 % for y~ -> infinity,
+    -5 % at y~ = 2.25."""
     return np.sqrt(_float(y) / 4.5)
 
 
 @np.errstate(all="ignore")
 def border_27(y: ArrayLike) -> Any:
-    """v~crit for every y~ [-]: 0.47 y~^(5/2) / (y~^2 + 0.94 y~^(1/2) / (1 + y~^2)), eq. (27).
+    """Return v~crit for every y~ [-]: 0.47 y~^(5/2) / (y~^2 + 0.94 y~^(1/2) / (1 + y~^2)), eq.
+    (27).
 
     Off by -5.2 % at y~ = 0.413, less elsewhere; -1.38 % for y~ -> infinity.
     """
@@ -265,8 +268,8 @@ def border_27(y: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def border_small_amplitude(y: ArrayLike) -> Any:
-    """v~crit for y~ -> 0, exact to two terms [-]: (y~^2 / 2)(1 - 5 y~^2 / 12).  Relative error
-    O(y~^4).
+    """Return v~crit for y~ -> 0, exact to two terms [-]: (y~^2 / 2)(1 - 5 y~^2 / 12). Relative
+    error O(y~^4).
 
     Eqs. (23) and (24) have 1/2 in place of 5/12.
     """
@@ -276,14 +279,15 @@ def border_small_amplitude(y: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def border_large_amplitude(y: ArrayLike) -> Any:
-    """v~crit for y~ -> infinity [-]: sqrt(y~ / 4.402914), eq. (26) with the exact constant.
+    """Return v~crit for y~ -> infinity [-]: sqrt(y~ / 4.402914), eq. (26) with the exact constant.
     Relative error 0.07/y~."""
     return np.sqrt(_float(y) / BORDER_CONSTANT)
 
 
 @np.errstate(all="ignore")
 def border_blend(y: ArrayLike) -> Any:
-    """v~crit for every y~ [-] by one formula of this project, relative error below 0.6 percent.
+    """Return v~crit for every y~ [-] by one formula of this project, relative error below 0.6
+    percent.
 
     v~crit = (y~^2 / 2) [(1 + (5/9 + d) w + c d w^2) / (1 + d w)]^(-3/4) with w = y~^2 and c =
     (4.402914 / 4)^(2/3): two terms of the small amplitudes, the leading one of the large; d is
@@ -298,7 +302,7 @@ def border_blend(y: ArrayLike) -> Any:
 
 @np.errstate(all="ignore")
 def corner_root(v: ArrayLike, eta: ArrayLike) -> Any:
-    """Positive root of mu~^3 + 2 (y~ - 1) mu~ = pi v~ [-]; mu~ near y~ = 1, v~ -> 0 to O(mu~^3).
-    eta = y~ - 1."""
+    """Return positive root of mu~^3 + 2 (y~ - 1) mu~ = pi v~ [-]; mu~ near y~ = 1, v~ -> 0 to
+    O(mu~^3). eta = y~ - 1."""
     v, eta = np.broadcast_arrays(_float(v), _float(eta))
     return kernels[-1].normal_form_root(v.ravel(), eta.ravel()).reshape(v.shape)[()]

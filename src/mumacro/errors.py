@@ -45,14 +45,14 @@ class TableError(MumacroError):
 
 
 def _shown(value: object) -> str:
-    """The value as text of bounded length."""
+    """Return the value as text of bounded length."""
     text = repr(value)
     return text if len(text) <= 200 else text[:197] + "..."
 
 
 def missing(extra: str, error: ImportError) -> str:
-    """What to install, in one line, where an import raised ``error``; ``extra`` is empty for the
-    library itself.
+    """Return what to install, in one line, where an import raised ``error``; ``extra`` is empty for
+    the library itself.
 
     Raises ``error`` itself when one of the project's own modules is missing: a fault that must not
     be hidden.

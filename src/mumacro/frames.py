@@ -84,7 +84,7 @@ def evaluate_labelled(
 
 
 def _common_index(frame: Any, values: Mapping[str, Any]) -> Any:
-    """The index of all Series; InputError for one that is indexed otherwise."""
+    """Return the index of all Series; InputError for one that is indexed otherwise."""
     series = {name: x for name, x in values.items() if library_of(x) == "pandas"}
     for name, one in series.items():
         if not hasattr(one, "index"):
@@ -97,14 +97,14 @@ def _common_index(frame: Any, values: Mapping[str, Any]) -> Any:
 
 
 def _codes(answer: Answer[Any], path: str) -> tuple[Any, tuple[str, ...]]:
-    """A text output as codes, -1 where a case is illegal, and the texts."""
+    """Return a text output as codes, -1 where a case is illegal, and the texts."""
     if path == "source":
         return np.ravel(answer.source_code), tuple(SOURCES)
     return np.ravel(answer.regime_code), tuple(REGIMES)
 
 
 def _as_pandas(answer: Answer[Any], index: Any) -> Any:
-    """A DataFrame with the remarks in its ``attrs``."""
+    """Return a DataFrame with the remarks in its ``attrs``."""
     import pandas as pd
 
     columns: dict[str, Any] = {}
@@ -122,7 +122,7 @@ def _as_pandas(answer: Answer[Any], index: Any) -> Any:
 
 
 def _as_polars(answer: Answer[Any]) -> Any:
-    """A DataFrame; it has no place for remarks, which are warnings."""
+    """Return a DataFrame; it has no place for remarks, which are warnings."""
     import polars as pl
 
     columns = []
@@ -139,7 +139,7 @@ def _as_polars(answer: Answer[Any]) -> Any:
 
 
 def _as_arrow(answer: Answer[Any], cases: Any) -> Any:
-    """A table, or a batch for a batch, with the remarks as JSON in its metadata."""
+    """Return a table, or a batch for a batch, with the remarks as JSON in its metadata."""
     import pyarrow as pa
 
     columns: dict[str, Any] = {}
@@ -160,8 +160,8 @@ def _as_arrow(answer: Answer[Any], cases: Any) -> Any:
 def _of_parts(
     surrogate: Any, cases: Any, values: Mapping[str, Any], include: Sequence[str], strict: bool
 ) -> Any:
-    """A DataFrame of Dask, part by part; one without rows is evaluated now, so that faults of its
-    columns show."""
+    """Return a DataFrame of Dask, part by part; one without rows is evaluated now, so that faults
+    of its columns show."""
     import pandas as pd
 
     options = {"include": include, "illegal": "raise" if strict else "nan"}
@@ -177,7 +177,7 @@ def _of_parts(
 def _of_chunks(
     surrogate: Any, values: Mapping[str, Any], include: Sequence[str], strict: bool
 ) -> Any:
-    """A Dataset, or a dict of arrays of Dask, chunk by chunk."""
+    """Return a Dataset, or a dict of arrays of Dask, chunk by chunk."""
     arrays, constants = dict[str, Any](), dict[str, Any]()
     for name, x in values.items():
         if hasattr(x, "to_dask_array"):
@@ -209,7 +209,7 @@ def _of_chunks(
 def _outputs(
     surrogate: Any, cases: Cases, include: Sequence[str], notes: list[Note] | None = None
 ) -> dict[str, Any]:
-    """All outputs of cases by path; what is said of them is added to ``notes``."""
+    """Return all outputs of cases by path; what is said of them is added to ``notes``."""
     answer = surrogate.answer(cases, chosen(include, cases))
     if notes is not None:
         for note in answer.notes:
@@ -223,7 +223,7 @@ def _as_xarray(
     types: Mapping[str, Any],
     notes: list[Note],
 ) -> Any:
-    """A Dataset; what Dask has not computed yet has no remarks."""
+    """Return a Dataset; what Dask has not computed yet has no remarks."""
     import xarray as xr
 
     options: dict[str, Any] = {
@@ -246,7 +246,7 @@ def _as_xarray(
 def _as_dask(
     evaluate: Callable[..., Any], arrays: Mapping[str, Any], types: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Lazy arrays by path."""
+    """Return lazy arrays by path."""
     import dask.array
 
     apply: Any = dask.array.apply_gufunc  # Dask declares no types
@@ -257,7 +257,7 @@ def _as_dask(
 
 
 def _call_aligned(call: Callable[[], Any], inputs: Mapping[str, Any]) -> Any:
-    """All results of ``call``; InputError where the labels or shapes of its arguments do not
+    """Return all results of ``call``; InputError where the labels or shapes of its arguments do not
     fit."""
     try:
         return call()

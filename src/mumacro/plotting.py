@@ -88,7 +88,7 @@ class Panels(NamedTuple):
     heights: tuple[float, ...] | None = None  #: of the rows, which share their x
 
     def on(self, figure: Any) -> Any:
-        """The axes of a figure, an array of them where there are several."""
+        """Return the axes of a figure, an array of them where there are several."""
         return figure.subplots(
             self.rows, self.columns, sharex=self.heights is not None, height_ratios=self.heights
         )
@@ -132,7 +132,7 @@ def _loaded(name: str) -> Any:
 
 
 def axes_for(ax: Any, panels: Panels = Panels()) -> Any:  # noqa: B008 - it cannot change
-    """The axes of matplotlib that were given, or new ones."""
+    """Return the axes of matplotlib that were given, or new ones."""
     if ax is not None:
         return ax
     pyplot = _loaded("pyplot")
@@ -140,7 +140,8 @@ def axes_for(ax: Any, panels: Panels = Panels()) -> Any:  # noqa: B008 - it cann
 
 
 def style() -> AbstractContextManager[None]:
-    """The style of this project's own pictures: those of the command and of the documents."""
+    """Return the style of this project's own pictures: those of the command and of the
+    documents."""
     matplotlib = _loaded("")
     looks = {
         "axes.prop_cycle": matplotlib.cycler(color=[BLUE, RED, "#00805a", "#a33a8f", GREY, INK]),
@@ -179,7 +180,8 @@ def save(
 
 
 def in_words(case: Mapping[str, Any], kind: Mapping[str, str] | None = None) -> str:
-    """A case as the title of a picture: the inputs [SI], numbers or (low, high), and what it is.
+    """Return a case as the title of a picture: the inputs [SI], numbers or (low, high), and what it
+    is.
 
     >>> in_words({"mu0": 0.3, "Fz": 10.0, "k": 1e6}, {"contact": "ball", "direction": "along"})
     '$\\\\mu_0$ = 0.3, $F_z$ = 10 N, $k$ = 1 N/µm; ball, along'
@@ -189,7 +191,7 @@ def in_words(case: Mapping[str, Any], kind: Mapping[str, str] | None = None) -> 
 
 
 def quantity_words(name: str, value: Any) -> str:
-    """An input [SI], a number or (low, high), with its symbol and the unit that suits it."""
+    """Return an input [SI], a number or (low, high), with its symbol and the unit that suits it."""
     ends = [value] if np.ndim(value) == 0 else [*value]
     if isinstance(value, str) or math.isinf(ends[-1]):
         return f"{_SYMBOLS[name]} rigid"
@@ -199,7 +201,7 @@ def quantity_words(name: str, value: Any) -> str:
 
 
 def _with_unit(si: str, *values: float) -> str:
-    """Numbers in an SI unit, in the one that suits the last of them."""
+    """Return numbers in an SI unit, in the one that suits the last of them."""
     unit, scale = suited(si, values[-1])
     numbers = " to ".join(f"{scale.of_si(value):.4g}" for value in values)
     unit_text = unit.replace("um", "µm").replace("uN", "µN").removeprefix("-")
@@ -207,7 +209,8 @@ def _with_unit(si: str, *values: float) -> str:
 
 
 def oscillation_words(symbol: str, unit: str, terms: Iterable[tuple[int, float, float]]) -> str:
-    """An oscillation from harmonics, amplitudes in an SI unit, phases in degrees; empty for none.
+    """Return an oscillation from harmonics, amplitudes in an SI unit, phases in degrees; empty for
+    none.
 
     >>> oscillation_words("$x$", "m", [(1, 2e-6, 90.0), (3, 4e-7, 0.0)])
     '$x$: 2 µm at 90°, 3rd harmonic 0.4 µm'
@@ -225,7 +228,7 @@ def oscillation_words(symbol: str, unit: str, terms: Iterable[tuple[int, float, 
 
 
 def regime_words(name: str) -> str:
-    """A regime as a picture names it."""
+    """Return a regime as a picture names it."""
     return REGIMES[name].words
 
 
@@ -234,14 +237,15 @@ def _axis(name: str) -> str:
 
 
 def _points(text: str, size: Any) -> float:
-    """The width of a text in points."""
+    """Return the width of a text in points."""
     properties = _loaded("font_manager").FontProperties(size=size)
     measure = _loaded("textpath").text_to_path.get_text_width_height_descent
     return float(measure(text, properties, ismath="$" in text)[0])
 
 
 def _room(ax: Any, last: Any = None) -> float:
-    """How wide a text above the axes may be, up to the right of the ``last`` ones [points]."""
+    """Return how wide a text above the axes may be, up to the right of the ``last`` ones
+    [points]."""
     boxes = []
     for one in (ax, last or ax):
         spec = one.get_subplotspec()  # with the room of a colour bar
@@ -250,7 +254,7 @@ def _room(ax: Any, last: Any = None) -> float:
 
 
 def _wrapped(text: str, width: float, size: Any) -> str:
-    """A text in lines of at most ``width`` points, broken behind commas and semicolons."""
+    """Return a text in lines of at most ``width`` points, broken behind commas and semicolons."""
     lines: list[str] = []
     for line in text.split("\n"):
         now = ""
@@ -265,8 +269,8 @@ def _wrapped(text: str, width: float, size: Any) -> str:
 
 
 def head(ax: Any, title: str, legend: bool = True, last: Any = None) -> None:
-    """The title of axes in as many lines as it needs, and below it their legend, which so covers no
-    curve; up to the right of the ``last`` axes."""
+    """Write the title of axes in as many lines as it needs, and below it their legend, which so
+    covers no curve; up to the right of the ``last`` axes."""
     size = "medium"
     pad = 6.0
     handles, labels = ax.get_legend_handles_labels()
@@ -305,7 +309,8 @@ def plot_law(
     roots_of: Mapping[float, Iterable[float]] = MappingProxyType({}),
     title: str = "",
 ) -> Any:
-    """mu_macro (n,) over values ``x`` (n,) of the input ``along``, with its static limit (n,).
+    """Return mu_macro (n,) over values ``x`` (n,) of the input ``along``, with its static limit
+    (n,).
 
     ``band`` are the least and the most mu_macro over an interval of k, (n,) each, or with
     ``band_of`` "std" one standard deviation below and above; ``borders`` places on ``x`` with their
@@ -346,8 +351,8 @@ def plot_roots(
     ax: Any = None,
     title: str = "",
 ) -> Any:
-    """A mean force ``of`` a motion (n,) over values ``x`` (n,) of an input, whose axis is ``name``,
-    with targets and roots."""
+    """Return a mean force ``of`` a motion (n,) over values ``x`` (n,) of an input, whose axis is
+    ``name``, with targets and roots."""
     ax, ink = axes_for(ax), _ink()
     symbol = {"mu_macro": r"\mathrm{macro}", "mu_lateral": r"\mathrm{lateral}"}[of]
     ax.plot(x, mean, color="C0", label=rf"$\mu_{symbol}$")
@@ -364,8 +369,8 @@ def plot_roots(
 
 
 def plot_fit(along: str, curves: Sequence[Curve], title: str, ax: Any = None) -> Any:
-    """Measured points, the fit and its band over the input ``along``, and below them the residuals;
-    more than 8 curves have no legend.
+    """Return measured points, the fit and its band over the input ``along``, and below them the
+    residuals; more than 8 curves have no legend.
 
     ``ax`` are two axes, or new ones; on one alone there are no residuals.  The upper ones are
     returned.
@@ -404,8 +409,8 @@ def plot_fit(along: str, curves: Sequence[Curve], title: str, ax: Any = None) ->
 
 
 def plot_loop(x: Array, force: Array, fitted: Array, title: str, ax: Any = None) -> Any:
-    """A measured loop, force [N] over displacement [m], and that of the model, and below them the
-    residuals; ``ax`` as for :func:`plot_fit`."""
+    """Return a measured loop, force [N] over displacement [m], and that of the model, and below
+    them the residuals; ``ax`` as for :func:`plot_fit`."""
     pair = axes_for(ax, OF_FIT)
     upper, lower = pair if np.ndim(pair) else (pair, None)
     scale, unit = 1e6, "µm"
@@ -424,7 +429,7 @@ def plot_loop(x: Array, force: Array, fitted: Array, title: str, ax: Any = None)
 
 
 def _ink() -> str:
-    """The colour of text in the user's style."""
+    """Return the colour of text in the user's style."""
     return str(_loaded("").rcParams["text.color"])
 
 
@@ -432,19 +437,19 @@ def _ink() -> str:
 
 
 def amplitudes(n: int, normal: bool = False) -> Array:
-    """``n`` amplitudes from the foot of the map to its top [-], evenly as its axis is: logarithmic,
-    linear for a ``normal`` force."""
+    """Return ``n`` amplitudes from the foot of the map to its top [-], evenly as its axis is:
+    logarithmic, linear for a ``normal`` force."""
     return np.linspace(*NORMAL_RANGE, n) if normal else np.geomspace(*Y_RANGE, n)
 
 
 def speeds(n: int) -> Array:
-    """``n`` speeds from the left of the map to its right [-]."""
+    """Return ``n`` speeds from the left of the map to its right [-]."""
     return np.geomspace(*V_RANGE, n)
 
 
 def band_colours() -> list[str]:
-    """The colour of each area between two contours, from below the lowest of ``LEVELS`` to above
-    the highest, #rrggbb."""
+    """Return the colour of each area between two contours, from below the lowest of ``LEVELS`` to
+    above the highest, #rrggbb."""
     middles = 0.5 * (np.array([0.0, *LEVELS]) + np.array([*LEVELS, 1.0]))
     table = np.array([[int(one[i : i + 2], 16) for i in (1, 3, 5)] for one in COLOURS])
     even = np.linspace(0.0, 1.0, len(COLOURS))
@@ -453,8 +458,8 @@ def band_colours() -> list[str]:
 
 
 def heights(ratio: Array, level: float) -> Array:
-    """How high mu~ falls below a level above each speed, in shares of the map's height, (n,) of
-    ``ratio`` (m, n), whose rows are even on the map; 1 where it does not, 0 where it is below
+    """Return how high mu~ falls below a level above each speed, in shares of the map's height, (n,)
+    of ``ratio`` (m, n), whose rows are even on the map; 1 where it does not, 0 where it is below
     everywhere."""
     below = ratio < level
     first = np.where(below.any(axis=0), below.argmax(axis=0), len(ratio))
@@ -466,7 +471,8 @@ def heights(ratio: Array, level: float) -> Array:
 
 
 def label_places(ratio: Array, border: Array) -> list[tuple[float, float, float]]:
-    """Where the numbers of the contours stand: (level, share of the width, share of the height).
+    """Return where the numbers of the contours stand: (level, share of the width, share of the
+    height).
 
     Each where its line is farthest from the other lines, from the ``border`` (n,), a height at each
     speed, from the names of the regimes and from the numbers that stand already; none for a line
@@ -495,13 +501,13 @@ def label_places(ratio: Array, border: Array) -> list[tuple[float, float, float]
 
 
 def _distances(x: Array, y: Array, across: Array, line: Array) -> Array:
-    """How far points (m,) are from a line of heights (n,) at ``across`` (n,); (m,)."""
+    """Return how far points (m,) are from a line of heights (n,) at ``across`` (n,); (m,)."""
     return np.asarray(np.hypot(x[:, None] - across, y[:, None] - line).min(axis=1))
 
 
 def bands(ax: Any, x: Array, y: Array, ratio: Array) -> tuple[Any, Any]:
-    """mu~ (m, n) over ``x`` (n,) and ``y`` (m,) in the colours of the map, with its contours:
-    areas and lines of matplotlib."""
+    """Return mu~ (m, n) over ``x`` (n,) and ``y`` (m,) in the colours of the map, with its
+    contours: areas and lines of matplotlib."""
     levels = [0.0, *LEVELS, 1.0]
     areas = ax.contourf(x, y, np.clip(ratio, 0.0, 1.0 - 1e-12), levels, colors=band_colours())
     return areas, ax.contour(x, y, ratio, LEVELS, colors=INK, linewidths=0.6, alpha=0.75)
@@ -518,8 +524,8 @@ def plot_map(
     areas: Sequence[str] = (),
     title: str = "",
 ) -> Any:
-    """mu~ (m, n) over :func:`speeds` and :func:`amplitudes`, with the border of continuous sliding
-    ``v_crit`` (m,), and cases: a ``point`` (v~, y~), or ``marks``.
+    """Return mu~ (m, n) over :func:`speeds` and :func:`amplitudes`, with the border of continuous
+    sliding ``v_crit`` (m,), and cases: a ``point`` (v~, y~), or ``marks``.
 
     ``direction`` is that of the oscillation; ``areas`` are the regimes at :data:`AREAS`.
     """
@@ -580,13 +586,13 @@ _AMPLITUDES = {
 
 
 def place(u: float, w: float, normal: bool = False) -> tuple[float, float]:
-    """(v~, y~) at shares of the map's width and height."""
+    """Return (v~, y~) at shares of the map's width and height."""
     v = V_RANGE[0] * (V_RANGE[1] / V_RANGE[0]) ** u
     return v, NORMAL_RANGE[1] * w if normal else Y_RANGE[0] * (Y_RANGE[1] / Y_RANGE[0]) ** w
 
 
 def on_map(v: Array, y: Array, ray: Array, normal: bool = False) -> tuple[Array, Array]:
-    """Where cases are drawn: (v~, y~) on the map, or at its edge.
+    """Return where cases are drawn: (v~, y~) on the map, or at its edge.
 
     Far out mu~ depends on y~/v~ alone, so that what is beyond the map is where its ray, on which
     this ratio is constant, leaves it; that is right for rigid contacts, too.
@@ -609,7 +615,7 @@ def on_map(v: Array, y: Array, ray: Array, normal: bool = False) -> tuple[Array,
 
 
 def _mark(ax: Any, marks: Marks, normal: bool, halo: Any) -> None:
-    """Cases by regime; those beyond the map at its edge, one of them with the word that says
+    """Mark cases by regime; those beyond the map at its edge, one of them with the word that says
     why."""
     v, y = on_map(marks.v, marks.y, marks.ray, normal)
     regimes = np.asarray(marks.regimes, object)
@@ -671,9 +677,9 @@ def plot_cycle(
     title: str,
     ax: Any = None,
 ) -> Any:
-    """Forces of one period over time, with the limit mu0 Fz, and the path of the upper point with
-    the force at 16 moments; all (n,), in SI.  ``ax`` are two axes, or new ones; on one alone there
-    is no path.  Those of the forces are returned."""
+    """Return forces of one period over time, with the limit mu0 Fz, and the path of the upper point
+    with the force at 16 moments; all (n,), in SI. ``ax`` are two axes, or new ones; on one alone
+    there is no path. Those of the forces are returned."""
     pair = axes_for(ax, OF_CYCLE)
     forces, path = pair if np.ndim(pair) else (pair, None)
     ink = _ink()
@@ -692,7 +698,7 @@ def plot_cycle(
 
 
 def _draw_path(path: Any, x: Array, y: Array, Fx: Array, Fy: Array) -> None:
-    """The path of the upper point on its axes, with the force at 16 moments."""
+    """Draw the path of the upper point on its axes, with the force at 16 moments."""
     extent = max(np.ptp(x), np.ptp(y))
     unit, scale = suited("m", float(extent))
     x, y = x * scale.over / scale.times, y * scale.over / scale.times

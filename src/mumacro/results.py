@@ -86,28 +86,28 @@ class Result:
     # --- what a kind of result says of itself -----------------------------------------------------
 
     def _members(self) -> Mapping[str, Any]:
-        """The members as JSON has them, arrays as arrays."""
+        """Return the members as JSON has them, arrays as arrays."""
         return self.columns
 
     def _heading(self) -> str:
-        """The first line."""
+        """Return the first line."""
         return f"<{type(self).__name__}>"
 
     def _shown(self) -> Mapping[str, Any]:
-        """The columns that are shown."""
+        """Return the columns that are shown."""
         return self.columns
 
     def _rows(self) -> Rows | None:
-        """Rows of name, value, unit and meaning in place of columns, where the result is about one
-        thing."""
+        """Return rows of name, value, unit and meaning in place of columns, where the result is
+        about one thing."""
         return None
 
     def _below(self) -> list[str]:
-        """What is said below, in a line each."""
+        """Return what is said below, in a line each."""
         return [note.line for note in self.notes]
 
     def _in_full(self) -> tuple[str, Rows | None, list[str]]:
-        """Heading, rows and what is said below, where there is room for all of it."""
+        """Return heading, rows and what is said below, where there is room for all of it."""
         return self._heading(), self._rows(), self._below()
 
 
@@ -115,8 +115,8 @@ class Result:
 
 
 def listed(value: Any) -> Any:
-    """Numbers, texts, lists and dicts for JSON: lists in place of arrays, None where a number is
-    not finite, and for no text.
+    """Return numbers, texts, lists and dicts for JSON: lists in place of arrays, None where a
+    number is not finite, and for no text.
 
     >>> listed({"mu_macro": np.array([0.2, np.nan]), "regime": "stick_slip"})
     {'mu_macro': [0.2, None], 'regime': 'stick_slip'}
@@ -143,7 +143,7 @@ def listed(value: Any) -> Any:
 
 
 def frame_of(columns: Mapping[str, Any]) -> Any:
-    """Columns as a DataFrame of pandas, one row a case; MumacroError without pandas."""
+    """Return columns as a DataFrame of pandas, one row a case; MumacroError without pandas."""
     try:
         import pandas
     except ModuleNotFoundError:
@@ -157,8 +157,8 @@ def frame_of(columns: Mapping[str, Any]) -> Any:
 
 
 def known(value: float, digits: int, error: float = 0.0, deviation: float = 0.0) -> str:
-    """A number with ``digits`` digits, less those that are not known: none is below the first digit
-    of its ``error``, or the second of its ``deviation``.
+    """Return a number with ``digits`` digits, less those that are not known: none is below the
+    first digit of its ``error``, or the second of its ``deviation``.
 
     >>> known(0.24046650645751835, 6), known(0.24046650645751835, 6, deviation=0.0136)
     ('0.240467', '0.240')
@@ -180,7 +180,7 @@ def known(value: float, digits: int, error: float = 0.0, deviation: float = 0.0)
 
 
 def tidy_zeros(text: str) -> str:
-    """A number without zeros at its end.
+    """Return a number without zeros at its end.
 
     >>> [tidy_zeros(text) for text in ("2.500", "100", "1.0e-07", "2.0")]
     ['2.5', '100', '1e-07', '2']
@@ -192,15 +192,15 @@ def tidy_zeros(text: str) -> str:
 
 
 def cell(value: Any) -> str:
-    """One value of a table."""
+    """Return one value of a table."""
     if isinstance(value, (float, np.floating)):
         return f"{value:.{_DIGITS}g}"
     return str(value)
 
 
 def _table_of(columns: Mapping[str, Any]) -> list[list[str]]:
-    """The heads of columns, and of their rows (n,) the first and the last; places stand before
-    them."""
+    """Return the heads of columns, and of their rows (n,) the first and the last; places stand
+    before them."""
     arrays = [np.asarray(x) for x in columns.values()]
     shape = arrays[0].shape if arrays else (0,)
     size = math.prod(shape)
@@ -215,7 +215,7 @@ def _table_of(columns: Mapping[str, Any]) -> list[list[str]]:
 
 
 def _fitting(table: Sequence[Sequence[str]]) -> tuple[list[str], int]:
-    """The rows of a table as lines, and how many of its last columns do not fit them."""
+    """Return the rows of a table as lines, and how many of its last columns do not fit them."""
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     count = len(widths)
     while count > 2 and 2 * count + sum(widths[:count]) > WIDTH:
@@ -240,8 +240,8 @@ def _broken(line: str) -> list[str]:
 def _text_of(
     heading: str, lines: Sequence[str], notes: Iterable[str], notes_first: bool = False
 ) -> str:
-    """A heading, lines and notes below them, in at most 16 lines of 100 characters; what does not
-    fit are the last notes, or with ``notes_first`` the last lines."""
+    """Return a heading, lines and notes below them, in at most 16 lines of 100 characters; what
+    does not fit are the last notes, or with ``notes_first`` the last lines."""
     below = [part for note in notes for part in _broken(f"  {note}")]
     if notes_first:
         below = below[: LINES - 2]
@@ -250,14 +250,15 @@ def _text_of(
 
 
 def _aligned(rows: Rows) -> list[str]:
-    """Rows of cells as lines of 100 characters at most."""
+    """Return rows of cells as lines of 100 characters at most."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ("  ".join(x.ljust(n) for x, n in zip(row, widths, strict=True)) for row in rows)
     return [f"  {line}".rstrip()[:WIDTH] for line in lines]
 
 
 def _table_lines(columns: Mapping[str, Any]) -> list[str]:
-    """The first and the last rows of columns as lines; columns that do not fit are counted."""
+    """Return the first and the last rows of columns as lines; columns that do not fit are
+    counted."""
     if not columns:
         return []
     lines, rest = _fitting(_table_of(columns))

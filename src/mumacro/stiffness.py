@@ -64,7 +64,7 @@ def _number(name: str, value: Any) -> float:
 
 
 def _positive(**values: Any) -> list[float]:
-    """The values as numbers in SI."""
+    """Return the values as numbers in SI."""
     numbers = {name: _number(name, value) for name, value in values.items()}
     for name, number in numbers.items():
         if not SMALLEST <= number <= LARGEST:
@@ -152,7 +152,8 @@ class Contact(Result):
     notes: tuple[Note, ...] = ()
 
     def keys(self) -> tuple[str, ...]:
-        """The keywords for ``evaluate``: k, and the kind of contact where it is not one spring."""
+        """Return the keywords for ``evaluate``: k, and the kind of contact where it is not one
+        spring."""
         return ("k",) if self.contact == "spring" else ("k", "contact")
 
     def __getitem__(self, name: str) -> Any:
@@ -176,13 +177,13 @@ class Contact(Result):
         return [(name, f"{x:.4g}", f"[{NUMBERS[name]}]") for name, x in self.columns.items()]
 
     def length_scale(self, mu0: float, Fz: float) -> float:
-        """l0 = mu0 Fz / k [m], eq. (5): the elongation at which the contact slips."""
+        """Return l0 = mu0 Fz / k [m], eq. (5): the elongation at which the contact slips."""
         mu0, Fz = _positive(mu0=mu0, Fz=Fz)
         return mu0 * (Fz / self.k)
 
 
 def _moduli(first: Material, second: Material) -> tuple[float, float]:
-    """E* and G* [Pa]."""
+    """Return E* and G* [Pa]."""
     for name, body in (("first", first), ("second", second)):
         if not isinstance(body, Material):
             raise InputError(
@@ -198,8 +199,8 @@ def _moduli(first: Material, second: Material) -> tuple[float, float]:
 def _hertz_cautions(
     half_width: float, radius: float, first: Material, second: Material, power: float
 ) -> tuple[Note, ...]:
-    """Warnings of a Hertzian contact that is wide beside the radius of the body; InputError where
-    it is wider.
+    """Return warnings of a Hertzian contact that is wide beside the radius of the body; InputError
+    where it is wider.
 
     The half width is proportional to E* to the power -``power``.
     """
@@ -233,14 +234,14 @@ def _hertz_cautions(
 
 
 def _issue_warnings(contact: Contact) -> Contact:
-    """The contact, whose warnings are issued to the caller of the caller."""
+    """Return the contact, whose warnings are issued to the caller of the caller."""
     for text in contact.warnings:
         warnings.warn(text, stacklevel=3)
     return contact
 
 
 def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) -> Contact:
-    """A ball on a flat, or two balls: Hertz's radius, Mindlin's stiffness.
+    """Return a ball on a flat, or two balls: Hertz's radius, Mindlin's stiffness.
 
     Parameters
     ----------
@@ -269,7 +270,7 @@ def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) ->
 
 
 def hertz_ball(radius: float, Fz: float, first: Material, second: Material) -> Contact:
-    """:func:`ball_on_flat`, whose warnings are in the result alone."""
+    """Return :func:`ball_on_flat`, whose warnings are in the result alone."""
     radius, Fz = _positive(radius=radius, Fz=Fz)
     modulus, shear = _moduli(first, second)
     a = (0.75 * (Fz / modulus) * radius) ** (1.0 / 3.0)
@@ -280,7 +281,7 @@ def hertz_ball(radius: float, Fz: float, first: Material, second: Material) -> C
 
 
 def flat_punch(radius: float, Fz: float, first: Material, second: Material) -> Contact:
-    """A flat circular end in full contact, such as a pin that has run in.
+    """Return a flat circular end in full contact, such as a pin that has run in.
 
     Parameters
     ----------
@@ -308,8 +309,8 @@ def flat_punch(radius: float, Fz: float, first: Material, second: Material) -> C
 def cylinder_on_flat(
     radius: float, length: float, Fz: float, first: Material, second: Material, oscillation: str
 ) -> Contact:
-    """A cylinder lying on a flat: Hertz's half width, the stiffness of an elongated contact in one
-    of two directions.
+    """Return a cylinder lying on a flat: Hertz's half width, the stiffness of an elongated contact
+    in one of two directions.
 
     With nu > 0 k across the axis is the larger one, by up to 1/(1 - nu); the model has one k.
     **The direction of the oscillation decides**: where the two differ by 1.3, mu~ with its k is
@@ -356,7 +357,7 @@ def cylinder_on_flat(
 def hertz_cylinder(
     radius: float, length: float, Fz: float, first: Material, second: Material, oscillation: str
 ) -> Contact:
-    """:func:`cylinder_on_flat`, whose warnings are in the result alone."""
+    """Return :func:`cylinder_on_flat`, whose warnings are in the result alone."""
     if oscillation not in AXES:
         raise InputError(
             "oscillation",
@@ -385,7 +386,7 @@ def hertz_cylinder(
 
 
 def _ellipse_compliance(narrow: float, wide: float, body: Material, along: bool) -> float:
-    """Tangential displacement over force [m/N] of a half-space under q ~ (1 - x^2/narrow^2 -
+    """Return tangential displacement over force [m/N] of a half-space under q ~ (1 - x^2/narrow^2 -
     y^2/wide^2)^(-1/2).
 
     At the middle it is (1/(8 pi G narrow wide)) times the integral over all directions of R ((1 -
@@ -404,8 +405,8 @@ def _ellipse_compliance(narrow: float, wide: float, body: Material, along: bool)
 
 
 def in_series(*stiffnesses: float) -> float:
-    """Stiffness [N/m] > 0 of springs in series, such as contact, roughness and holder; ``math.inf``
-    is a rigid part.
+    """Return stiffness [N/m] > 0 of springs in series, such as contact, roughness and holder;
+    ``math.inf`` is a rigid part.
 
     >>> round(in_series(3e6, 6e6))
     2000000

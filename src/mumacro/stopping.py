@@ -52,7 +52,7 @@ _CURRENT = ContextVar("mumacro.stop", default=Stop())  # noqa: B039  (never set)
 
 
 def current() -> Stop:
-    """The flag that computations of this thread look at."""
+    """Return the flag that computations of this thread look at."""
     return _CURRENT.get()
 
 

@@ -148,13 +148,14 @@ class Surrogate:
         contact: str = "spring",
         direction: str = "across",
     ) -> Any:
-        """The map of mu~ with a ``point`` (v~, y~) on axes ``ax`` of matplotlib, or new ones, which
-        are returned; see ``mumacro.plotting.plot_map``."""
+        """Return the map of mu~ with a ``point`` (v~, y~) on axes ``ax`` of matplotlib, or new
+        ones, which are returned; see ``mumacro.plotting.plot_map``."""
         kind = kind_of(contact, direction)
         return self.draw_map(ax, kind, f"{contact}, {direction}", point=point)
 
     def draw_map(self, ax: Any, kind: Kind, title: str, **cases: Any) -> Any:
-        """The map of a kind of contact with cases as ``mumacro.plotting.plot_map`` takes them."""
+        """Return the map of a kind of contact with cases as ``mumacro.plotting.plot_map`` takes
+        them."""
         ratio, border = self.map_of(kind, 281, 201)
         return plotting.plot_map(
             ratio,
@@ -167,14 +168,14 @@ class Surrogate:
         )
 
     def map_of(self, kind: Kind, width: int, height: int) -> tuple[Array, Array]:
-        """mu~ (height, width) on the map of a kind of contact, rows from its foot, and v~crit of
-        each row (height,)."""
+        """Return mu~ (height, width) on the map of a kind of contact, rows from its foot, and
+        v~crit of each row (height,)."""
         v, y = plotting.speeds(width), plotting.amplitudes(height, kind.normal)
         ratio = self.quantity("mu_ratio", v, y[:, None], **kind.names)[0]
         return ratio, self.v_tilde_crit(y, **kind.names)
 
     def regimes_on_map(self, kind: Kind) -> list[str]:
-        """The regimes at ``plotting.AREAS`` of the map of a kind of contact."""
+        """Return the regimes at ``plotting.AREAS`` of the map of a kind of contact."""
         v, y = zip(*(plotting.place(*at, kind.normal) for at in plotting.AREAS), strict=True)
         swing = {"Fz_amplitude" if kind.normal else "y0": np.array(y)}
         # v~ = v0 and y~ = y0
@@ -182,7 +183,7 @@ class Surrogate:
         return [str(name) for name in self.evaluate(cases, **kind.names).regime]
 
     def on_one_thread(self) -> Self:
-        """The same table, whose calls start no thread."""
+        """Return the same table, whose calls start no thread."""
         other = copy.copy(self)
         other.tabulated = self.tabulated.on_one_thread()
         return other
@@ -254,7 +255,8 @@ class Surrogate:
     # --- dimensionless ----------------------------------------------------------------------------
 
     def mu_ratio(self, v_tilde: Any, y_tilde: Any) -> Any:
-        """mu~ = mu_macro/mu0 [-] of one spring that is shaken across, eq. (15): the fast path.
+        """Return mu~ = mu_macro/mu0 [-] of one spring that is shaken across, eq. (15): the fast
+        path.
 
         Of a ball: ``quantity("mu_ratio", v_tilde, y_tilde, contact="ball")``, with its bound.
 
@@ -297,8 +299,8 @@ class Surrogate:
     def v_tilde_crit(
         self, y_tilde: Numbers, *, contact: str = "spring", direction: str = "across"
     ) -> Any:
-        """Border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude ``y_tilde`` [-]
-        >= 0.
+        """Return border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude
+        ``y_tilde`` [-] >= 0.
 
         Infinite for infinite amplitude.  Relative error below ``border.max_rel_error``.  For a ball
         all springs slide from there on; along and normal it is the amplitude itself, for normal
@@ -319,7 +321,7 @@ class Surrogate:
         return _reshape(crit, shape)
 
     def power(self, v_tilde: Numbers, y_tilde: Numbers, **kind: str) -> Any:
-        """Mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega:
+        """Return mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega:
         :meth:`quantity` without bound.
 
         Slip turns v~ mu~ plus this power into heat.  An infinite amplitude gives infinite power.
@@ -327,15 +329,15 @@ class Surrogate:
         return self.quantity("power", v_tilde, y_tilde, **kind)[0]
 
     def stick_fraction(self, v_tilde: Numbers, y_tilde: Numbers, **kind: str) -> Any:
-        """Share of the period during which the contact sticks [-], 0 to 1: :meth:`quantity` without
-        bound."""
+        """Return share of the period during which the contact sticks [-], 0 to 1: :meth:`quantity`
+        without bound."""
         return self.quantity("stick_fraction", v_tilde, y_tilde, **kind)[0]
 
     def slopes(
         self, v_tilde: Numbers, y_tilde: Numbers, of: str = "mu_ratio", *, bounds: bool = False
     ) -> tuple[Any, ...]:
-        """The quantity ``of`` a name as in :meth:`quantity`, and its slopes v~ d/d v~ and y~ d/d y~
-        [-].
+        """Return the quantity ``of`` a name as in :meth:`quantity`, and its slopes v~ d/d v~ and y~
+        d/d y~ [-].
 
         With ``bounds`` also those of the two slopes' absolute errors.  Arguments, shapes and errors
         as in :meth:`mu_ratio`.
@@ -362,8 +364,8 @@ class Surrogate:
         contact: str = "spring",
         direction: str = "across",
     ) -> tuple[Any, Any, Any]:
-        """A tabulated quantity, the bound of its absolute error, and the source code (index into
-        SOURCES).
+        """Return a tabulated quantity, the bound of its absolute error, and the source code (index
+        into SOURCES).
 
         ``name`` is "mu_ratio", "power" or "stick_fraction"; other arguments, shapes and errors as
         in :meth:`mu_ratio`.  Of a ball the stick fraction is a share of the load, too; at the
@@ -394,7 +396,7 @@ class Surrogate:
         return _reshape(value, shape), _reshape(bound_, shape), _reshape(source, shape)
 
     def _quantity(self, argument: str, name: Any) -> str:
-        """The name of a quantity that the table has."""
+        """Return the name of a quantity that the table has."""
         if not isinstance(name, str) or name not in self.table.quantities:
             bound = f"one of {', '.join(self.table.quantities)}, which the table has"
             raise InputError(argument, name, bound)
@@ -470,7 +472,8 @@ class Surrogate:
         illegal: str = "nan",
         **unknown_names: Any,
     ) -> Any:
-        """Macroscopic friction from dimensional inputs, scalars or arrays that broadcast together.
+        """Return macroscopic friction from dimensional inputs, scalars or arrays that broadcast
+        together.
 
         Parameters
         ----------
@@ -601,7 +604,7 @@ class Surrogate:
     def answer(
         self, cases: Cases, outputs: tuple[Output, ...] = (), groups: bool = False
     ) -> Answer[Any]:
-        """:meth:`evaluate` of cases in their one form, with outputs of
+        """Return :meth:`evaluate` of cases in their one form, with outputs of
         ``mumacro.outputs.evaluation.chosen``; ``groups`` keeps v~, y~ and l0, too."""
         answer = evaluation.answer(self.tabulated, cases, outputs, groups)
         answer._surrogate = self
@@ -609,13 +612,13 @@ class Surrogate:
 
     @staticmethod
     def in_words(answer: Answer[float]) -> tuple[Rows, Rows, str]:
-        """The answer to one case as the command prints it, and a notebook shows."""
+        """Return the answer to one case as the command prints it, and a notebook shows."""
         from mumacro.words import of_one_case  # loaded by those alone who show an answer
 
         return of_one_case(answer)
 
     def _one(self, six: tuple[Any, ...], with_f: bool, gradient: bool, kind: Kind) -> Answer[float]:
-        """The answer to one case across in plain numbers; NaN where it is illegal."""
+        """Return the answer to one case across in plain numbers; NaN where it is illegal."""
         if with_f:
             six = (*six[:4], RAD_PER_CYCLE * float(six[4]), six[5])
         row = self.tabulated.one(six, gradient, kind.contact)
@@ -660,7 +663,7 @@ def _reopen(path: str, checksum: str, threads: int | None, image: bytes | None) 
 
 
 def _illegal(v: Array, y: Array, bound: str = "finite and >= 0") -> InputError:
-    """The error of a single point; ``bound`` is that of y~."""
+    """Return the error of a single point; ``bound`` is that of y~."""
     return (
         InputError("y_tilde", float(y[0]), bound)
         if v[0] >= 0.0
@@ -673,7 +676,7 @@ def _reshape(values: NDArray[Any], shape: tuple[int, ...]) -> Any:
 
 
 def _flat_groups(v_tilde: Any, y_tilde: Any) -> tuple[Array, Array, tuple[int, ...]]:
-    """Both broadcast together, flat and contiguous, and their shape."""
+    """Return both broadcast together, flat and contiguous, and their shape."""
     if type(v_tilde) is np.ndarray is type(y_tilde) and v_tilde.dtype == y_tilde.dtype == _FLOAT:
         v, y = v_tilde, y_tilde
     else:

@@ -84,19 +84,19 @@ def rows_of(answer: Answer[float], effect: float | None = None) -> list[Row]:
 
 
 def _is_elastic(answer: Answer[float]) -> bool:
-    """Whether a contact is elastic and shaken."""
+    """Return whether a contact is elastic and shaken."""
     inputs = answer.cases.columns
     swing = inputs[AMPLITUDE if answer.cases.kind.normal else "y0"]
     return not (math.isinf(inputs["k"]) or inputs["omega"] == 0.0 or swing == 0.0)
 
 
 def _is_beyond(answer: Answer[float]) -> bool:
-    """Whether no contact has the y~ of a case that is elastic and shaken."""
+    """Return whether no contact has the y~ of a case that is elastic and shaken."""
     return _is_elastic(answer) and not answer.cases.kind.normal and answer.y_tilde > FURTHEST
 
 
 def _assumptions(answer: Answer[float], effect: float) -> list[Note]:
-    """What the model leaves out in a case, of an interval of k in its geometric middle.
+    """Return what the model leaves out in a case, of an interval of k in its geometric middle.
 
     Where k is an interval or has a deviation, there is no note on k: the answer shows what follows.
     """
@@ -189,8 +189,8 @@ def _share(half_width: float, middle: float) -> float:
 
 
 def digits(uncertainty: float, least: int = 4, most: int = 6) -> int:
-    """Digits to show of a number that is known to ``uncertainty``, relatively: one beyond the first
-    that it moves.
+    """Return digits to show of a number that is known to ``uncertainty``, relatively: one beyond
+    the first that it moves.
 
     >>> digits(0.06), digits(3e-5), digits(0.0)
     (4, 6, 6)
@@ -255,7 +255,7 @@ def _on_tilt(mu0: float, y: float) -> Note | None:
 
 
 def _on_cycle(answer: Answer[float], six: Mapping[str, Any]) -> list[Note]:
-    """What follows from the slip path of a period, taken from one spring."""
+    """Return what follows from the slip path of a period, taken from one spring."""
     groups = (np.array([x]) for x in (answer.v_tilde, answer.y_tilde))
     rate = float(decay_of_springs(answer._surrogate.tabulated, *groups).rate[0])
     slip = 2.0 * math.pi * rate  # over l0

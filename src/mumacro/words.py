@@ -28,8 +28,8 @@ _SHOWN = ("std", "std_share", "gradient")  # in rows of their own
 def of_one_case(
     answer: Answer[Any], shown: int | None = None, units: Mapping[str, str] | None = None
 ) -> tuple[Rows, Rows, str]:
-    """Rows of name, value, unit and meaning; what the answer assumes, and remarks, each with the
-    word for which of them it is; and its numerical error.
+    """Return rows of name, value, unit and meaning; what the answer assumes, and remarks, each with
+    the word for which of them it is; and its numerical error.
 
     Numbers have the digits that are known, and the unit that ``units`` has for their input, or else
     the one that suits them; with ``shown`` that many digits, in SI.
@@ -42,8 +42,8 @@ def of_one_case(
 
 
 def in_words(note: Note, kind: Kind, case: Mapping[str, Any]) -> Note:
-    """A note on a case in the words of its contact, a ball is not one spring, and with what is
-    typed in place of an advice.
+    """Return a note on a case in the words of its contact, a ball is not one spring, and with what
+    is typed in place of an advice.
 
     >>> from mumacro.inputs.kind import kind_of
     >>> in_words(Note("assumes", "...", "one spring"), kind_of("ball"), {"k": 1.0}).row
@@ -68,8 +68,8 @@ def with_unit(
     error: float = 0.0,
     typed: tuple[str, Scale] | None = None,
 ) -> tuple[str, str]:
-    """A number in an SI unit with ``count`` digits, and the unit that was ``typed``, or suits it;
-    with ``shown`` that many digits, in SI.
+    """Return a number in an SI unit with ``count`` digits, and the unit that was ``typed``, or
+    suits it; with ``shown`` that many digits, in SI.
 
     >>> with_unit(2.4547623e-6, "m", 4), with_unit(2.4547623e-6, "m", 4, 8)
     (('2.455', 'um'), ('2.4547623e-06', 'm'))
@@ -81,7 +81,7 @@ def with_unit(
 
 
 def _stiffness(k: float, shown: int | None, units: Mapping[str, str]) -> str:
-    """A stiffness that was given, or the middle of an interval."""
+    """Return a stiffness that was given, or the middle of an interval."""
     typed = None
     if "k" in units and (scale := scale_of("k", units["k"])) is not None:
         typed = units["k"], scale
@@ -92,7 +92,7 @@ def _stiffness(k: float, shown: int | None, units: Mapping[str, str]) -> str:
 def _rows_of(
     answer: Any, kind: Kind, shown: int | None, count: int, units: Mapping[str, str]
 ) -> Rows:
-    """An answer as rows of name, value, unit, meaning."""
+    """Return an answer as rows of name, value, unit, meaning."""
     surrogate, cases = answer._surrogate, answer.cases
     std = answer["std"] if "std" in answer.paths else 0.0
 

@@ -1,16 +1,19 @@
 """Examples of docstrings run."""
 
+import ast
 import contextlib
 import doctest
 import importlib
 import pkgutil
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import mumacro
+from tests.support.places import ROOT
 
 # no module of Python, or one of PyInstaller
 NO_PYTHON = {"mumacro.__main__", "mumacro._kernel", "mumacro._pyinstaller.hook-mumacro"}
@@ -79,3 +82,30 @@ def test_names_in_docstrings_lead_somewhere(name: str) -> None:
     named = re.findall(r":(?:func|class|meth|mod|data|attr):`~?([^`]+)`", text)
     missing = [one for one in named if not is_found(one, module)]
     assert [one for one in missing if f"self.{one}: " not in text] == []
+
+
+NO_VERBS = {
+    "A", "All", "An", "As", "At", "Between", "Both", "By", "Each", "Every", "How", "Its", "Of",
+    "One", "That", "The", "Those", "What", "Where", "Whether", "Which", "Who", "Why",
+}  # fmt: skip
+
+
+def functions_of(package: str) -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
+    """Yield the functions of a package that are no properties, with their places."""
+    for path in sorted((ROOT / package).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                decorators = " ".join(map(ast.unparse, node.decorator_list))
+                if not re.search(r"property|setter|overload", decorators):
+                    yield f"{path.name}:{node.lineno} {node.name}", node
+
+
+@pytest.mark.parametrize("package", ["src/mumacro", "service"])
+def test_the_docstring_of_a_function_begins_with_a_verb(package: str) -> None:
+    told = {
+        place: (ast.get_docstring(function) or "Do").split()[0]
+        for place, function in functions_of(package)
+        if not function.name.startswith("__")
+    }
+    assert len(told) > 200
+    assert [place for place, word in told.items() if word.strip(".,:;") in NO_VERBS] == []

@@ -57,7 +57,9 @@ def test_no_case_of_the_documents_is_doubted() -> None:
     count = 0
     for page, case in cases():
         columns = {
-            name: value if isinstance(value, (list, tuple)) else read(name, value).si
+            name: [read(name, one).si for one in value]
+            if isinstance(value, (list, tuple))
+            else read(name, value).si
             for name, value in case.items()
             if name in INPUTS and value not in (None, "")
         }

@@ -71,12 +71,12 @@ _BUILD = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def fmu2(table: Table) -> bytes:
-    """An FMU of FMI 2.0."""
+    """Return an FMU of FMI 2.0."""
     return _unit(table, 2)
 
 
 def fmu3(table: Table) -> bytes:
-    """An FMU of FMI 3.0."""
+    """Return an FMU of FMI 3.0."""
     return _unit(table, 3)
 
 
@@ -115,8 +115,8 @@ def _unit(table: Table, version: int) -> bytes:
 
 
 def _targets(version: int) -> Iterator[tuple[str, list[str]]]:
-    """Files below ``binaries`` and the commands that make them; zig first, which binds to an old C
-    library."""
+    """Yield files below ``binaries`` and the commands that make them; zig first, which binds to an
+    old C library."""
     folders = {
         "x86_64-linux": "linux64",
         "x86_64-windows": "win64",
@@ -140,14 +140,14 @@ def _targets(version: int) -> Iterator[tuple[str, list[str]]]:
 
 
 def _zig(target: str) -> list[str] | None:
-    """The command that compiles for a target of zig; None where the package ziglang is not
+    """Return the command that compiles for a target of zig; None where the package ziglang is not
     installed."""
     package = importlib.util.find_spec("ziglang")
     return [sys.executable, "-m", "ziglang", "cc", "-target", target] if package else None
 
 
 def _compile(texts: dict[str, str], command: list[str]) -> bytes:
-    """The output of ``command``, run in a folder that holds ``texts`` by name."""
+    """Return the output of ``command``, run in a folder that holds ``texts`` by name."""
     with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
         for name, text in texts.items():
             Path(folder, name).write_text(text, "ascii")
@@ -162,7 +162,7 @@ def _compile(texts: dict[str, str], command: list[str]) -> bytes:
 
 
 def _description(version: int, token: str) -> str:
-    """modelDescription.xml."""
+    """Return modelDescription.xml."""
     fmi2, numbers = version == 2, {name: number for number, name in enumerate(_TEXTS, 1)}
     token_name, state_flag, derivatives_flag = (
         ("guid", "canGetAndSetFMUstate", "providesDirectionalDerivative")
@@ -212,7 +212,7 @@ def _description(version: int, token: str) -> str:
 
 
 def _type(fmi2: bool, name: str) -> str:
-    """The enumeration of a parameter."""
+    """Return the enumeration of a parameter."""
     items = "".join(f'<Item name="{item}" value="{i}"/>' for i, item in enumerate(_CHOICES[name]))
     if fmi2:
         return f'<SimpleType name="{name}"><Enumeration>{items}</Enumeration></SimpleType>'

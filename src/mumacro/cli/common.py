@@ -98,8 +98,8 @@ def question(
     least: str = "+",
     first: tuple[str, dict[str, Any]] | None = None,
 ) -> OneLineParser:
-    """The parser of a command that is given a case and has ``-o``; ``first`` is an argument that
-    stands before it."""
+    """Return the parser of a command that is given a case and has ``-o``; ``first`` is an argument
+    that stands before it."""
     parser = OneLineParser(prog=f"mumacro {name}", description=description, epilog=epilog)
     if first:
         parser.add_argument(first[0], **first[1])
@@ -114,15 +114,15 @@ def question(
 
 
 def add_case(parser: OneLineParser, words: str, least: str = "+") -> None:
-    """The inputs, explained by ``words``, the kind of contact, and the options of all commands that
-    answer."""
+    """Add the inputs, explained by ``words``, the kind of contact, and the options of all commands
+    that answer."""
     parser.add_argument("words", nargs=least, metavar="name=value", help=words)
     add_kind(parser)
     add_table(parser)
 
 
 def add_kind(parser: argparse.ArgumentParser) -> None:
-    """The options for the contact and the direction of its oscillation; :func:`kind_in` reads
+    """Add the options for the contact and the direction of its oscillation; :func:`kind_in` reads
     them."""
     parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
     text = f"{', '.join(DIRECTIONS)} (of the normal force); default: across"
@@ -132,31 +132,31 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
 
 
 def add_include(parser: argparse.ArgumentParser) -> None:
-    """The option for outputs beside mu_macro."""
+    """Add the option for outputs beside mu_macro."""
     text = ", ".join(OUTPUTS)
     parser.add_argument("--include", action="append", default=[], metavar="NAMES", help=text)
 
 
 def included(options: argparse.Namespace) -> tuple[str, ...]:
-    """The outputs that ``--include`` names; InputError for an unknown one."""
+    """Return the outputs that ``--include`` names; InputError for an unknown one."""
     return tuple(name for text in options.include for name in names_in(text))
 
 
 def kind_in(options: argparse.Namespace) -> Kind:
-    """The contact and direction that were chosen; InputError for a ball whose normal force
+    """Return the contact and direction that were chosen; InputError for a ball whose normal force
     oscillates."""
     return kind_of(options.contact, options.direction)
 
 
 def add_table(parser: OneLineParser) -> None:
-    """The options of all commands that read a table and answer."""
+    """Add the options of all commands that read a table and answer."""
     text = "a file, or the largest error; default: the tightest bundled one"
     parser.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
     add_form(parser)
 
 
 def add_format(parser: argparse.ArgumentParser) -> None:
-    """The options for the form of a table as text; :func:`dialect_in` reads them."""
+    """Add the options for the form of a table as text; :func:`dialect_in` reads them."""
     for name, choices, text in (
         ("sep", SEPARATORS, "between the cells"),
         ("decimal", (".", ","), "in numbers"),
@@ -173,7 +173,7 @@ def add_format(parser: argparse.ArgumentParser) -> None:
 
 
 def _lines(text: str) -> tuple[int, int]:
-    """The numbers of two lines; argparse says the fault of another text."""
+    """Return the numbers of two lines; argparse says the fault of another text."""
     first, dots, last = text.partition("..")
     if not (dots and first.isdecimal() and last.isdecimal() and 0 < int(first) <= int(last)):
         raise argparse.ArgumentTypeError(f"{text!r}: must be two numbers of lines, as 4..12")
@@ -181,7 +181,7 @@ def _lines(text: str) -> tuple[int, int]:
 
 
 def dialect_in(options: argparse.Namespace) -> Dialect:
-    """How a table as text is written, as far as the options say."""
+    """Return how a table as text is written, as far as the options say."""
     if options.skip < 0:
         raise UsageError(f"--skip {options.skip}: a number of lines, 0 or more")
     return Dialect(
@@ -196,14 +196,14 @@ def dialect_in(options: argparse.Namespace) -> Dialect:
 
 
 def add_exponent(parser: OneLineParser) -> None:
-    """The option for a stiffness that grows with the load."""
+    """Add the option for a stiffness that grows with the load."""
     text = "k grows as Fz^M from its value at the case's Fz; of a ball: 1/3"
     number = number_of("stiffness_exponent")
     parser.add_argument("--stiffness-exponent", type=number, metavar="M", help=text)
 
 
 def add_form(parser: argparse.ArgumentParser) -> None:
-    """The options for the form of a result."""
+    """Add the options for the form of a result."""
     parser.add_argument("--json", action="store_true", help="print JSON, with all digits")
     text = "digits, in SI; default: those that are known, up to 6; 15: all"
     parser.add_argument("--digits", type=int, choices=range(1, 18), metavar="N", help=text)
@@ -252,7 +252,7 @@ def read_case(
     optional: Sequence[str] = (),
     deviations: bool = False,
 ) -> dict[str, Any]:
-    """The inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; keywords of
+    """Return the inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; keywords of
     ``Surrogate.evaluate``.
 
     ``without`` are unknown or swept inputs, which must not be there; ``one_k`` says why ``k`` must
@@ -324,7 +324,7 @@ def _read(name: str, text: str, one_k: str, deviations: bool) -> dict[str, float
 
 
 def _unknown(name: str, text: str, similar: str | None, kind: Kind) -> str:
-    """Why a name is refused, and what to write."""
+    """Return why a name is refused, and what to write."""
     if name in ("contact", "direction"):
         return f"{name} is an option: --{name} {text}"
     if name == AMPLITUDE:
@@ -354,8 +354,8 @@ def _pairs(words: Sequence[str]) -> list[tuple[str, str | None]]:
 
 
 def _is_name(word: str) -> bool:
-    """Whether a word stands for an input and has no value; else it belongs to the value before it,
-    and is refused with that where it is no part of one."""
+    """Return whether a word stands for an input and has no value; else it belongs to the value
+    before it, and is refused with that where it is no part of one."""
     if word in (*INPUTS, *KIND):
         return True
     return not belongs_to_value(word) and suggestion(word, loosely=False) is not None
@@ -385,8 +385,8 @@ def _faults_of_names(
 def other_meaning(
     target: float, is_ratio: bool, case: Mapping[str, Any], holds: Callable[[float], bool]
 ) -> str:
-    """The option that was perhaps forgotten or too much, where a target is out of reach: it may be
-    mu_macro, or its ratio to mu0.  ``holds`` says whether a mu_macro is in reach."""
+    """Return the option that was perhaps forgotten or too much, where a target is out of reach: it
+    may be mu_macro, or its ratio to mu0. ``holds`` says whether a mu_macro is in reach."""
     mu0 = case.get("mu0")
     if not mu0 or not holds(target if is_ratio else target * mu0):
         return ""
@@ -396,20 +396,20 @@ def other_meaning(
 
 
 def without_or_load(unknown: str) -> dict[str, Any]:
-    """Keywords of ``read_case``: the unknown must not be there; Fz may be, as the load at which k
-    holds."""
+    """Return keywords of ``read_case``: the unknown must not be there; Fz may be, as the load at
+    which k holds."""
     return {"optional": ["Fz"]} if unknown == "Fz" else {"without": [unknown]}
 
 
 def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
-    """A case with the geometric middle in place of an interval of k."""
+    """Return a case with the geometric middle in place of an interval of k."""
     one_k, _ = without_interval(case)
     return {name: float(x) if isinstance(x, np.ndarray) else x for name, x in one_k.items()}
 
 
 def units_in(words: Sequence[str], **more: Sequence[str]) -> dict[str, str]:
-    """The units that were typed, by input; ``more`` are other texts of an input, such as the ends
-    of a range, which come first.
+    """Return the units that were typed, by input; ``more`` are other texts of an input, such as the
+    ends of a range, which come first.
 
     >>> units_in(["mu0=0.3 Fz=10N", "k=1 N/um v0=1mm/s"], v0=["0.1m/s", "1"])
     {'v0': 'm/s', 'Fz': 'N', 'k': 'N/um'}
@@ -431,7 +431,7 @@ class Unit(NamedTuple):
 
     @classmethod
     def of(cls, name: str, value: float, units: Mapping[str, str], digits: int | None) -> "Unit":
-        """That of an input: the one that was typed, or the one that suits a value [SI]; with
+        """Return that of an input: the one that was typed, or the one that suits a value [SI]; with
         ``--digits`` the SI unit."""
         if digits is not None:
             return cls(unit_of(name), Scale())
@@ -441,11 +441,11 @@ class Unit(NamedTuple):
         return cls(*suited(unit_of(name), value))
 
     def head(self, name: str) -> str:
-        """The head of a column."""
+        """Return the head of a column."""
         return f"{name} [{self.name}]"
 
     def shown(self, value: float, count: int, digits: int | None, error: float = 0.0) -> str:
-        """A value [SI] with ``count`` digits, those that its ``error`` leaves; or with
+        """Return a value [SI] with ``count`` digits, those that its ``error`` leaves; or with
         ``--digits``."""
         if digits is not None:
             return f"{value:.{digits}g}"
@@ -453,7 +453,7 @@ class Unit(NamedTuple):
 
 
 def case_line(case: Mapping[str, Any], units: Mapping[str, str], kind: Kind, *more: str) -> str:
-    """The case that was understood, in the units that were typed, and ``more`` of it."""
+    """Return the case that was understood, in the units that were typed, and ``more`` of it."""
     parts = []
     for name, value in case.items():
         if name.startswith("std_") or name == ENDS[1]:
@@ -472,8 +472,8 @@ def case_line(case: Mapping[str, Any], units: Mapping[str, str], kind: Kind, *mo
 
 
 def number_of(name: str, advice: str = "") -> Callable[[str], float]:
-    """The reader of an option that is a number, as 0.15, 0,15 or 15%; argparse says the fault of
-    another text, with the ``advice``."""
+    """Return the reader of an option that is a number, as 0.15, 0,15 or 15%; argparse says the
+    fault of another text, with the ``advice``."""
 
     def number(text: str) -> float:
         try:
@@ -485,8 +485,8 @@ def number_of(name: str, advice: str = "") -> Callable[[str], float]:
 
 
 def read_values(pairs: Iterable[tuple[str, str]], reader: Callable[[str, str], Any]) -> list[Any]:
-    """Values from pairs of name and text, with or without a unit, in SI; UsageError names all that
-    are none."""
+    """Return values from pairs of name and text, with or without a unit, in SI; UsageError names
+    all that are none."""
     values, faults = [], []
     for name, text in pairs:
         try:
@@ -499,8 +499,8 @@ def read_values(pairs: Iterable[tuple[str, str]], reader: Callable[[str, str], A
 
 
 def open_table(table: str | None) -> Surrogate:
-    """The table that ``--table`` names: a tolerance, a path, or nothing for the tightest bundled
-    one."""
+    """Return the table that ``--table`` names: a tolerance, a path, or nothing for the tightest
+    bundled one."""
     try:
         return Surrogate.open(None if table is None else float(table))
     except ValueError:
@@ -513,12 +513,12 @@ def open_table(table: str | None) -> Surrogate:
 
 
 def table_members(surrogate: Surrogate) -> dict[str, Any]:
-    """What names a table in JSON."""
+    """Return what names a table in JSON."""
     return {"id": surrogate.id, "tolerance": surrogate.tolerance}
 
 
 def in_columns(rows: Iterable[Sequence[str]]) -> str:
-    """Rows of cells as text in columns."""
+    """Return rows of cells as text in columns."""
     columns = list(zip_longest(*rows, fillvalue=""))
     widths = [max(map(len, column)) for column in columns]
     cells_of_rows = (
@@ -529,7 +529,7 @@ def in_columns(rows: Iterable[Sequence[str]]) -> str:
 
 
 def note_lines(notes: Iterable[Note]) -> list[str]:
-    """What is said below a result."""
+    """Return what is said below a result."""
     return [in_columns([(note.word, note.about)]) for note in notes]
 
 
@@ -554,7 +554,7 @@ def write_result(
 
 
 def as_json(value: object) -> str:
-    """JSON in which what is not finite is null."""
+    """Return JSON in which what is not finite is null."""
 
     def clean(item: Any) -> Any:
         if isinstance(item, dict):

@@ -37,7 +37,7 @@ exit codes: 0 all rows, 3 some are rejected, 1 could not run, 2 wrong arguments,
 
 
 def _standard_input(folder: Path) -> Path:
-    """Standard input as a file, in the format that it begins like."""
+    """Return standard input as a file, in the format that it begins like."""
     path = folder / "standard-input"
     with path.open("w+b") as stream:
         shutil.copyfileobj(sys.stdin.buffer, stream, 2**20)
@@ -64,13 +64,13 @@ class _Bar(Progress):
         self._rows = self.add_task("", total=1.0)
 
     def show(self, share: float, rows: int, rejected: int) -> None:
-        """So many rows are read, and so many of these rejected."""
+        """Show how many rows are read, and how many of these are rejected."""
         description = f"{rows:,} rows, {rejected:,} rejected"
         self.update(self._rows, completed=share, description=description)
 
 
 def _parser() -> OneLineParser:
-    """The arguments of the command."""
+    """Return the arguments of the command."""
     parser = OneLineParser(
         prog="mumacro eval",
         description="Evaluate every case of files: Parquet, text, .xlsx. "
@@ -150,7 +150,7 @@ def main(words: Sequence[str]) -> int:
 
 
 def _remark(remark: Remark) -> str:
-    """A remark in the last line."""
+    """Return a remark in the last line."""
     cases = remark["cases"]
     rows = f" in {cases:,} rows" if cases > 1 else ""
     return f"; remark on {remark['field']}{rows}: {remark['text']}"

@@ -42,7 +42,7 @@ examples:
 
 
 def _parser() -> OneLineParser:
-    """The arguments of the command."""
+    """Return the arguments of the command."""
     first = "points", {"help": "a table as text, or .xlsx; - is standard input"}
     description = "k and mu0 of a contact from measured friction."
     parser = common.question("fit", description, _COLUMNS, "the other inputs", "*", first)
@@ -58,7 +58,7 @@ def _parser() -> OneLineParser:
 
 
 def run(words: Sequence[str]) -> str:
-    """``mumacro fit``."""
+    """Run ``mumacro fit``."""
     options = _parser().parse_intermixed_args(words)
     unknown, more = (
         [x for x in options.unknown or () if ("=" in x) == has_value] for has_value in (False, True)
@@ -117,7 +117,8 @@ def _output(result: Fit, options: Namespace, surrogate: Surrogate) -> str:
 
 
 def _text(result: Fit, digit_count: int | None) -> str:
-    """Values with standard deviations and intervals, the scatter, other solutions, warnings."""
+    """Return values with standard deviations and intervals, the scatter, other solutions,
+    warnings."""
     rows: list[Sequence[str]] = []
     for name, value in result.values.items():
         off, (low, high) = result.std[name], result.interval[name]

@@ -31,7 +31,7 @@ examples:
 
 
 def _cycles(text: str) -> tuple[int, int]:
-    """The first and the last cycle; argparse says the fault of another text."""
+    """Return the first and the last cycle; argparse says the fault of another text."""
     first, _, last = text.partition("..")
     if not (first.isdecimal() and (last or first).isdecimal()):
         raise argparse.ArgumentTypeError(f"{text!r}: must be numbers of cycles, as 3..8")
@@ -39,7 +39,7 @@ def _cycles(text: str) -> tuple[int, int]:
 
 
 def _parser() -> OneLineParser:
-    """The arguments of the command."""
+    """Return the arguments of the command."""
     description = "k and mu0 of a contact from a measured loop of force over displacement."
     parser = OneLineParser(prog="mumacro fit-loop", description=description, epilog=_ABOUT)
     parser.add_argument("loop", help="a table as text, or .xlsx; - is standard input")
@@ -62,7 +62,7 @@ def _parser() -> OneLineParser:
 
 
 def run(words: Sequence[str]) -> str:
-    """``mumacro fit-loop``."""
+    """Run ``mumacro fit-loop``."""
     options = _parser().parse_intermixed_args(words)
     names = {"displacement": options.displacement, "force": options.force}
     if options.load is not None:
@@ -102,7 +102,7 @@ def run(words: Sequence[str]) -> str:
 
 
 def _load(words: Sequence[str], column: str | None) -> Any:
-    """The normal force that is typed [N]; None where it is a column."""
+    """Return the normal force that is typed [N]; None where it is a column."""
     text = " ".join(words)
     name, equals, value = text.partition("=")
     if column is not None:
@@ -118,6 +118,6 @@ def _load(words: Sequence[str], column: str | None) -> Any:
 
 
 def _text(found: LoopFit) -> str:
-    """Values with intervals, energy, scatter, and notes."""
+    """Return values with intervals, energy, scatter, and notes."""
     samples = ("samples", str(found.residuals.size), "", f"{found.contact}, {found.cycles} cycles")
     return "\n".join([in_columns([*found._rows(), samples]), *(note.line for note in found.notes)])

@@ -24,7 +24,7 @@ EXAMPLE = 'mumacro law "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz" --along v0 0.1mm/
 
 
 def _parser() -> OneLineParser:
-    """The arguments of the command."""
+    """Return the arguments of the command."""
     description = (
         "mu_macro over a range of one input, with the static value and the border of "
         "continuous sliding."
@@ -42,7 +42,7 @@ def _parser() -> OneLineParser:
 
 
 def run(words: Sequence[str]) -> str:
-    """``mumacro law``."""
+    """Run ``mumacro law``."""
     options = _parser().parse_intermixed_args(words)
     (along, *ends), kind = options.along, common.kind_in(options)
     if along not in kind.columns:
@@ -90,7 +90,7 @@ def run(words: Sequence[str]) -> str:
 def _table(
     columns: Mapping[str, Any], units: Mapping[str, Unit], count: int, digits: int | None
 ) -> str:
-    """The columns of a law as text, those with a unit in it; ``source`` is left out."""
+    """Return the columns of a law as text, those with a unit in it; ``source`` is left out."""
     cells = {
         units[name].head(name) if name in units else name: [
             _cell(x, name, units.get(name), count, digits, error)
@@ -105,7 +105,7 @@ def _table(
 def _cell(
     value: Any, name: str, unit: Unit | None, count: int, digits: int | None, error: float
 ) -> str:
-    """A cell: a text, or a number with the digits that are known."""
+    """Return a cell: a text, or a number with the digits that are known."""
     if isinstance(value, str):
         return value
     if math.isnan(value):

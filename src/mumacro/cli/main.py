@@ -47,8 +47,8 @@ OVERVIEW = (
 
 
 def _part(name: str) -> Any:
-    """The command of ``builder`` or ``service``: inside the package when installed, at the top of a
-    checkout."""
+    """Return the command of ``builder`` or ``service``: inside the package when installed, at the
+    top of a checkout."""
     package = Path(__file__).resolve().parent.parent
     if (package / name).is_dir():
         return importlib.import_module(f"mumacro.{name}.__main__")
@@ -99,7 +99,7 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int | str]] = {
 
 
 def _no_command(words: Sequence[str]) -> str:
-    """A case, or what helps a person who wrote something else."""
+    """Return a case, or what helps a person who wrote something else."""
     if not words:
         return FIRST
     similar = difflib.get_close_matches(words[0], COMMANDS, n=1, cutoff=0.7)

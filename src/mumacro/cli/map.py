@@ -10,7 +10,7 @@ from mumacro.cli.common import UsageError, open_table, read_case
 
 
 def run(words: Sequence[str]) -> str:
-    """``mumacro map``."""
+    """Run ``mumacro map``."""
     description = (
         "The map of mu~ = mu_macro/mu0 over the dimensionless speed and amplitude, with a case "
         "on it."

@@ -28,7 +28,7 @@ _SI = {"t": "s", "x": "m", "y": "m", "Fx": "N", "Fy": "N", "Fz": "N"}
 
 
 def add_parts(parser: argparse.ArgumentParser) -> None:
-    """The options of a motion."""
+    """Add the options of a motion."""
     helps = (
         "A: amplitude [m] along the drag, half of peak to peak",
         "across it, likewise",
@@ -39,7 +39,7 @@ def add_parts(parser: argparse.ArgumentParser) -> None:
 
 
 def run(words: Sequence[str]) -> str:
-    """``mumacro motion``."""
+    """Run ``mumacro motion``."""
     parser = OneLineParser(
         prog="mumacro motion",
         description="Mean friction and steady cycle of a contact that is dragged along x and "
@@ -91,7 +91,7 @@ def run(words: Sequence[str]) -> str:
 def _shown(
     name: str, value: float, unit: str, motion: Motion, digits: int | None
 ) -> tuple[str, str]:
-    """A number with the digits that its estimate leaves, and its unit."""
+    """Return a number with the digits that its estimate leaves, and its unit."""
     share = {"mu_macro": 1.0, "mu_lateral": 1.0}
     if name == "power_drive" and motion.mu_macro:  # mu_macro Fz v0
         share[name] = abs(value / motion.mu_macro)

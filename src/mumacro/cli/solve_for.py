@@ -34,7 +34,7 @@ UNKNOWN = (*dict.fromkeys((*NAMES, AMPLITUDE, *UNKNOWNS)),)
 
 
 def _unknown(text: str) -> str:
-    """The name of an unknown; argparse says what another text may mean."""
+    """Return the name of an unknown; argparse says what another text may mean."""
     if text in UNKNOWN:
         return text
     similar = suggestion(text, loosely=False)
@@ -47,7 +47,7 @@ def _unknown(text: str) -> str:
 
 
 def _parser() -> OneLineParser:
-    """The arguments of the command."""
+    """Return the arguments of the command."""
     description = "Every value of one input at which mu_macro is the target."
     epilog = (
         f"{common.ABOUT_INPUTS}\nexample, the amplitude [m] that halves the friction:\n"
@@ -78,7 +78,7 @@ def _parser() -> OneLineParser:
 
 
 def run(words: Sequence[str]) -> str:
-    """``mumacro solve-for``."""
+    """Run ``mumacro solve-for``."""
     options = _parser().parse_intermixed_args(words)
     if solve_motion.is_motion(options):
         return solve_motion.run(options, options.between)
@@ -132,7 +132,7 @@ def run(words: Sequence[str]) -> str:
 
 
 def _solutions_by_k(solution: TableSolution, case: Mapping[str, Any]) -> dict[Any, TableSolution]:
-    """The solution, of an interval of k also those of its ends, by k [N/m], ascending."""
+    """Return the solution, of an interval of k also those of its ends, by k [N/m], ascending."""
     middle = common.middle_of(case).get("k")
     if solution.ends is None:
         return {middle: solution}
@@ -141,7 +141,8 @@ def _solutions_by_k(solution: TableSolution, case: Mapping[str, Any]) -> dict[An
 
 
 def _heads(unknown: str, k: str | None) -> list[str]:
-    """The heads of the columns of roots, from those of the unknown and, of an interval, of k."""
+    """Return the heads of the columns of roots, from those of the unknown and, of an interval, of
+    k."""
     return [*([k] if k else []), unknown, "between", "and", "mu_macro [-]", "regime"]
 
 
@@ -153,7 +154,7 @@ def _table(
     count: int,
     digits: int | None,
 ) -> str:
-    """The roots as text, with their k where that is an interval."""
+    """Return the roots as text, with their k where that is an interval."""
     table = [_heads(unit.head(unknown), k_unit.head("k") if k_unit else None)]
     for k, root in rows:
         of_k = [tidy_zeros(k_unit.shown(k, 6, digits))] if k_unit else []
@@ -163,7 +164,7 @@ def _table(
 
 
 def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: TableSolution) -> str:
-    """What was perhaps meant where a target is out of reach."""
+    """Return what was perhaps meant where a target is out of reach."""
     if solution.constant:
         return ""
     return common.other_meaning(options.target, options.ratio, case, solution.reach.holds)

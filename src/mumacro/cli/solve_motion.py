@@ -20,12 +20,12 @@ EXAMPLE = 'mumacro solve-for v0 "mu0=0.3 Fz=10N k=0.1N/um f=50Hz" --x 0.1mm --no
 
 
 def is_motion(options: argparse.Namespace) -> bool:
-    """Whether a motion is given, or one of its members is the unknown."""
+    """Return whether a motion is given, or one of its members is the unknown."""
     return "." in options.unknown or any(getattr(options, name) is not None for name in PARTS)
 
 
 def run(options: argparse.Namespace, within: list[str] | None) -> str:
-    """The roots over a motion, as text, JSON, a picture or CSV."""
+    """Return the roots over a motion, as text, JSON, a picture or CSV."""
     if options.direction != "across":
         raise UsageError("--direction is left out beside --x, --y and --normal, which say it")
     texts = [(name, text) for name in PARTS if (text := getattr(options, name)) is not None]
@@ -81,7 +81,7 @@ def run(options: argparse.Namespace, within: list[str] | None) -> str:
 
 
 def _unit_of(solution: MotionSolution, typed: Sequence[str], digits: int | None) -> Unit:
-    """The unit in which the roots are printed."""
+    """Return the unit in which the roots are printed."""
     unit, (first, *_) = solution.unit, solution.roots[0]
     if digits is not None:
         return Unit(unit, Scale())
@@ -95,5 +95,5 @@ def _unit_of(solution: MotionSolution, typed: Sequence[str], digits: int | None)
 
 
 def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: MotionSolution) -> str:
-    """What was perhaps meant where a target is out of reach."""
+    """Return what was perhaps meant where a target is out of reach."""
     return common.other_meaning(options.target, options.ratio, case, solution.reach.holds)

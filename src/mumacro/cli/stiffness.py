@@ -18,7 +18,7 @@ from mumacro.stiffness import MATERIALS, NUMBERS, Material
 
 
 def _example(geometry: str) -> str:
-    """A command that answers."""
+    """Return a command that answers."""
     names = (*GEOMETRIES[geometry].arguments, *BODIES[:2])
     options = (f"--{name} {ARGUMENTS[name].example}" for name in names)
     return " ".join(("mumacro stiffness", geometry, *options))
@@ -47,7 +47,7 @@ def _of_materials(options: argparse.Namespace, arguments: Mapping[str, Any]) -> 
 
 
 def run(words: Sequence[str]) -> str:
-    """``mumacro stiffness``."""
+    """Run ``mumacro stiffness``."""
     parser = OneLineParser(
         prog="mumacro stiffness",
         description="The tangential stiffness k of a contact from materials and geometry, and the "

@@ -10,7 +10,7 @@ from mumacro.table.bundled import bundled_tables
 
 
 def run(words: Sequence[str]) -> str:
-    """``mumacro table``."""
+    """Run ``mumacro table``."""
     parser = OneLineParser(
         prog="mumacro table",
         description="Name, path, tolerance, verified errors and checksum of the table in use.",
@@ -45,8 +45,8 @@ def run(words: Sequence[str]) -> str:
 
 
 def _errors(surrogate: Surrogate) -> Iterator[str]:
-    """How the errors of the answers are distributed, and those of others' interpolation of the
-    plain grid, as text."""
+    """Yield how the errors of the answers are distributed, and those of others' interpolation of
+    the plain grid, as text."""
     yield (
         "Errors that a share of the verified points does not exceed; then how many\n"
         "times the error its bound is: 1 or more is a bound that holds.\n"
@@ -60,7 +60,7 @@ def _errors(surrogate: Surrogate) -> Iterator[str]:
 
 
 def _by_share(errors: dict[str, dict[str, float]]) -> str:
-    """Statistics by name in columns, shares of points as per cent."""
+    """Return statistics by name in columns, shares of points as per cent."""
     heads = [
         f"{100.0 * float(name):g} %" if name[0].isdigit() else name
         for name in next(iter(errors.values()))

@@ -177,7 +177,7 @@ class Element:
         return f"<Element {self.contact}{springs}, force {self.force}>"
 
     def _limits(self, Fz: Array) -> Array:
-        """mu0 Fz [N] of every contact."""
+        """Return mu0 Fz [N] of every contact."""
         flat = Fz.reshape(-1)
         with np.errstate(over="ignore"):
             limit = self._mu0 * flat
@@ -190,7 +190,7 @@ class Element:
         return limit
 
     def _like(self, value: Numbers, name: str) -> Array:
-        """``value`` for every contact, (n,) and contiguous; finite."""
+        """Return ``value`` for every contact, (n,) and contiguous; finite."""
         if type(value) is float and math.isfinite(value):
             return np.full(self._k.size, value)
         numbers = real(name, value)

@@ -85,7 +85,8 @@ GEOMETRIES = {
 
 
 def contact_of(geometry: str, /, **arguments: Any) -> Contact:
-    """The contact of one of :data:`GEOMETRIES`, from its arguments and those of the bodies in SI.
+    """Return the contact of one of :data:`GEOMETRIES`, from its arguments and those of the bodies
+    in SI.
 
     Its warnings, and remarks on lengths that bodies do not usually have, are in it.
     InputError for an unknown geometry, and an argument that is missing,
@@ -99,7 +100,7 @@ def contact_of(geometry: str, /, **arguments: Any) -> Contact:
 
 
 def _contact(geometry: str, **arguments: Any) -> Contact:
-    """The contact without the remarks on its lengths."""
+    """Return the contact without the remarks on its lengths."""
     if geometry not in GEOMETRIES:
         raise InputError("geometry", geometry, f"one of {', '.join(GEOMETRIES)}")
     entry = GEOMETRIES[geometry]
@@ -130,7 +131,7 @@ def _contact(geometry: str, **arguments: Any) -> Contact:
 
 
 def _of_diameter(geometry: str, diameter: float, **arguments: Any) -> Contact:
-    """The contact of a ball, pin or cylinder whose diameter is given."""
+    """Return the contact of a ball, pin or cylinder whose diameter is given."""
     try:
         return _contact(geometry, radius=0.5 * diameter, **arguments)
     except InputError as error:
@@ -140,7 +141,7 @@ def _of_diameter(geometry: str, diameter: float, **arguments: Any) -> Contact:
 
 
 def doubts_of(arguments: Mapping[str, Any]) -> list[Note]:
-    """Lengths of a geometry that bodies do not usually have, each with a question.
+    """Return lengths of a geometry that bodies do not usually have, each with a question.
 
     >>> [doubt.text for doubt in doubts_of({"radius": 5.0})]
     ['radius = 5 m: is it 5 mm? Usual is 1e-06 to 0.5 m']
@@ -158,7 +159,7 @@ def doubts_of(arguments: Mapping[str, Any]) -> list[Note]:
 
 
 def read_argument(name: str, text: str) -> Any:
-    """The value of an argument in SI from text; ``rigid`` is an infinite modulus.
+    """Return the value of an argument in SI from text; ``rigid`` is an infinite modulus.
 
     >>> read_argument("E", "210 GPa"), read_argument("radius", "5mm"), read_argument("E2", "rigid")
     (210000000000.0, 0.005, inf)

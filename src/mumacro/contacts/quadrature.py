@@ -15,7 +15,7 @@ DEGREES = np.array([13, 14, 15, 19, 20, 21, 25, 26, 27])
 
 
 def piece_rule(nodes: int) -> Array:
-    """Points (nodes, 2): the share of the radius beyond a node, and its weight.
+    """Return points (nodes, 2): the share of the radius beyond a node, and its weight.
 
     Gauss's rule in t, where xi(t) has a slope proportional to t (1 - t): a function of xi that ends
     in a square root is smooth in t.

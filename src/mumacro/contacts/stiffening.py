@@ -33,8 +33,8 @@ class Stiffening(NamedTuple):
     load: float  #: Fz_given [N], at which k_given holds
 
     def stiffness(self, k: float, load: ArrayLike) -> Array:
-        """k [N/m] at loads [N], (n,), of a contact that has ``k`` at :attr:`load`; InputError where
-        it is no double > 0."""
+        """Return k [N/m] at loads [N], (n,), of a contact that has ``k`` at :attr:`load`;
+        InputError where it is no double > 0."""
         loads = np.asarray(load, dtype=np.float64)
         with np.errstate(over="ignore", under="ignore", invalid="ignore"):
             stiffnesses = np.asarray(k * (loads**self.exponent / self.load**self.exponent))
@@ -49,7 +49,7 @@ class Stiffening(NamedTuple):
         return stiffnesses
 
     def scaled(self, case: Mapping[str, Any], load: ArrayLike) -> dict[str, Array]:
-        """The stiffnesses of a case, k or the ends of its interval, at loads [N], (n,)."""
+        """Return the stiffnesses of a case, k or the ends of its interval, at loads [N], (n,)."""
         if "k" not in case:
             stiffness = {name: read(name, case[name]).si for name in ENDS if name in case}
         elif (one := read("k", case["k"])).low is not None and one.high is not None:
@@ -59,12 +59,13 @@ class Stiffening(NamedTuple):
         return {name: self.stiffness(float(k), load) for name, k in stiffness.items()}
 
     def place(self, ratio: float) -> float:
-        """The load [N] at which k/Fz is ``ratio`` times what it is at :attr:`load`; for m < 1."""
+        """Return the load [N] at which k/Fz is ``ratio`` times what it is at :attr:`load`; for m <
+        1."""
         power = math.log(self.load) - math.log(ratio) / (1.0 - self.exponent)
         return math.exp(min(max(power, -690.0), 690.0))
 
     def range(self, k: float) -> tuple[float, float]:
-        """Between which loads [N] both the load and k are far within double range."""
+        """Return between which loads [N] both the load and k are far within double range."""
         log_k, log_far = math.log(k), math.log(_FAR)
         low, high = (
             math.log(self.load) + (side * log_far - log_k) / self.exponent for side in (-1.0, 1.0)
@@ -75,7 +76,8 @@ class Stiffening(NamedTuple):
 def stiffening_of(
     case: Mapping[str, Any], unknown: str, kind: Kind, exponent: float | None
 ) -> tuple[Mapping[str, Any], Stiffening | None]:
-    """How k grows where Fz is swept or solved for, and the case without the load at which k holds.
+    """Return how k grows where Fz is swept or solved for, and the case without the load at which k
+    holds.
 
     That load is the ``Fz`` of the case.  Without it k is constant, and an exponent > 0 is refused;
     beside a spring without an exponent it is refused, too.  None where k is constant.

@@ -44,7 +44,8 @@ _NULLS = sorted({text for gap in GAPS for text in (gap, gap.upper(), gap.title()
 
 
 def format_of(path: Path, formats: Mapping[str, str] = WRITTEN) -> tuple[str, bool]:
-    """The format by a name's ending, empty for another ending, and whether it is compressed."""
+    """Return the format by a name's ending, empty for another ending, and whether it is
+    compressed."""
     name = path.name.lower()
     is_compressed = name.endswith(".gz")
     file_format = formats.get(ending_of(path), "")
@@ -52,7 +53,7 @@ def format_of(path: Path, formats: Mapping[str, str] = WRITTEN) -> tuple[str, bo
 
 
 def ending_of(path: Path) -> str:
-    """The ending of a name, before that of a compressed file.
+    """Return the ending of a name, before that of a compressed file.
 
     >>> ending_of(Path("cases.CSV.gz"))
     '.csv'
@@ -63,7 +64,7 @@ def ending_of(path: Path) -> str:
 def find_files(
     cases: Sequence[str | Path], say: Callable[[str], None] = lambda _text: None
 ) -> tuple[list[Path], str]:
-    """The files that paths, folders and patterns name, in order, and their format.
+    """Return the files that paths, folders and patterns name, in order, and their format.
 
     A file that is named itself is a table as text where its ending tells nothing.  What others
     leave in a folder is skipped, and said.  FilesError where one names no file, or formats differ.
@@ -96,7 +97,7 @@ def find_files(
 
 
 def _tables_among(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
-    """The files of a folder that are tables of cases, and the others."""
+    """Return the files of a folder that are tables of cases, and the others."""
     usable = [
         path
         for path in paths
@@ -231,7 +232,7 @@ class TextSource:
 
 
 def _columns(rows: Rows, table: TextTable, names: Sequence[str]) -> list[pa.Array]:
-    """The columns of rows: inputs as numbers, or as text where a cell is no plain number."""
+    """Return the columns of rows: inputs as numbers, or as text where a cell is no plain number."""
     places = {head: str(i) for i, head in enumerate(table.layout.heads)}
     as_text = dict.fromkeys((places[name] for name in names), pa.string())
     inputs = {str(i) for i in table.layout.inputs}.intersection(as_text)

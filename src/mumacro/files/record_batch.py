@@ -45,7 +45,7 @@ class FilesError(MumacroError):
 
 
 def answer_fields(names: Sequence[str] = ANSWERS) -> list[pa.Field]:
-    """The Arrow fields of the columns that :func:`answer` adds."""
+    """Return the Arrow fields of the columns that :func:`answer` adds."""
     words = pa.dictionary(pa.int8(), pa.string())
     return [
         pa.field(name, words if name in ("regime", "source") else pa.float64()) for name in names
@@ -145,8 +145,8 @@ def find_columns(
     where: str = "",
     units: Mapping[str, str] | None = None,
 ) -> Columns:
-    """What the columns of these names mean, and the names of those with answers; ``units`` are
-    those that fields say, by column.
+    """Return what the columns of these names mean, and the names of those with answers; ``units``
+    are those that fields say, by column.
 
     FilesError names, after ``where``, all columns that stand twice in the heading, would be written
     twice, have an unknown unit, or are missing; for a missing one it lists the columns of the file,
@@ -202,7 +202,7 @@ def find_columns(
 
 
 def _with_unit(name: str, unit: str | None) -> str:
-    """A head with the unit of its field, where it has none."""
+    """Return a head with the unit of its field, where it has none."""
     return f"{name} [{unit}]" if unit and split_unit(name)[1] is None else name
 
 
@@ -237,7 +237,7 @@ def kind_in(batch: pa.RecordBatch, kind: Kind, where: str = "") -> Kind:
 
 
 def names_of_columns(rigid: bool = False) -> ColumnNames:
-    """The columns that a table of cases may have, and those that it needs."""
+    """Return the columns that a table of cases may have, and those that it needs."""
     names = [*SI, *LIKE]
     like = {name: LIKE.get(name, name) for name in names}
     like |= {f"std_{name}": unit for name, unit in like.items()}
@@ -247,8 +247,8 @@ def names_of_columns(rigid: bool = False) -> ColumnNames:
 
 
 def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
-    """The faults of columns that are missing, as parts of one sentence: the last, on k, goes on
-    with what is said of the columns before it."""
+    """Yield the faults of columns that are missing, as parts of one sentence: the last, on k, goes
+    on with what is said of the columns before it."""
     if "y0" in inputs and AMPLITUDE in (split_unit(column)[0] for column in names):
         yield f"there is no column y0, but {AMPLITUDE}: give --direction normal"
         inputs = [name for name in inputs if name != "y0"]
@@ -261,7 +261,7 @@ def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
 def answer_columns(
     batch: pa.RecordBatch, surrogate: Surrogate, columns: Columns, signs: Signs | None = None
 ) -> AnswerColumns:
-    """The answers to a batch; ``signs`` are those of numbers as text.
+    """Return the answers to a batch; ``signs`` are those of numbers as text.
 
     Raise FilesError where it has another contact or direction than the batches before it.
     """
@@ -314,8 +314,8 @@ def _dictionary(codes: Codes, words: Sequence[str], mask: Bools | None) -> pa.Ar
 def numbers(
     array: pa.Array, name: str, signs: Signs, scale: Scale
 ) -> tuple[Array, Array, dict[int, str]]:
-    """A column of the input ``name`` as doubles (n,) in its own unit and in SI, NaN where a cell
-    has no number, and what is wrong with it.
+    """Return a column of the input ``name`` as doubles (n,) in its own unit and in SI, NaN where a
+    cell has no number, and what is wrong with it.
 
     FilesError where the column is of another type than numbers or text.
     """
@@ -348,7 +348,7 @@ def numbers(
 
 
 def _field_and_reason(error: InputError) -> tuple[str, str]:
-    """The input of a row that has no result, and why."""
+    """Return the input of a row that has no result, and why."""
     name, value = error.field, error.value
     number = float(value)  # type: ignore[arg-type]  # a number of the row
     if math.isnan(number):

@@ -209,8 +209,8 @@ class _Run:
         return stream
 
     def _new_pieces(self) -> Iterator[tuple[_State, Any, float]]:
-        """The pieces of the output, with the state after each and the share of the input that is
-        read; the head comes first."""
+        """Yield the pieces of the output, with the state after each and the share of the input that
+        is read; the head comes first."""
         state = _State()
         if self.output.format == "text":
             headings = [*(self.source.schema.names if self.keeps_lines else ()), *self.schema.names]
@@ -233,7 +233,7 @@ class _Run:
                 ) from None
 
     def _piece(self, state: _State, block: Block) -> tuple[_State, Any]:
-        """A block as it stands in the output, and the state after it."""
+        """Return a block as it stands in the output, and the state after it."""
         answers, rejects, inputs, notes = answer_columns(
             block.batch, self.surrogate, self.columns, block.signs
         )
@@ -265,6 +265,6 @@ class _Run:
 
 
 def _state_of(path: Path) -> tuple[int, ...]:
-    """What shows whether a file has changed."""
+    """Return what shows whether a file has changed."""
     is_now = path.stat()
     return is_now.st_ino, is_now.st_size, is_now.st_mtime_ns

@@ -62,7 +62,7 @@ class Output(NamedTuple):
         return self.pack("".join(rows.to_pylist()))
 
     def _cells(self, name: str, column: pa.Array) -> pa.Array:
-        """A column as cells of text, empty ones where it is null."""
+        """Return a column as cells of text, empty ones where it is null."""
         if pa.types.is_dictionary(column.type):
             column = column.dictionary_decode()
         if pa.types.is_nested(column.type):
@@ -87,8 +87,8 @@ class Output(NamedTuple):
 
     @contextmanager
     def writing(self, stream: BinaryIO, schema: pa.Schema) -> Iterator[Callable[[Any], object]]:
-        """What writes a piece; doubles in Parquet are written plainly, which is three times as
-        fast."""
+        """Yield what writes a piece; doubles in Parquet are written plainly, which is three times
+        as fast."""
         if self.format != "parquet":
             yield stream.write
             return

@@ -23,8 +23,8 @@ class Cycles(NamedTuple):
 
 
 def cycles_of(x: Array) -> Cycles:
-    """The whole cycles of a motion: each ends where the motion is back at its first place, in its
-    first direction.
+    """Return the whole cycles of a motion: each ends where the motion is back at its first place,
+    in its first direction.
 
     >>> cycles_of(np.sin(np.linspace(0.0, 6.0 * np.pi, 301)))
     Cycles(begins=(0, 100, 200, 301), goes_on=False)
@@ -53,8 +53,8 @@ def cycles_of(x: Array) -> Cycles:
 
 
 def _turns(x: Array) -> tuple[list[int], int]:
-    """The samples at which a motion turns back by half of its range, and its first direction, 1 or
-    -1."""
+    """Return the samples at which a motion turns back by half of its range, and its first
+    direction, 1 or -1."""
     span = _TURN * float(np.ptp(x))
     turns: list[int] = []
     direction, least, most = 0, 0, 0

@@ -39,7 +39,7 @@ def fit(
     surrogate: Surrogate | None = None,
     **fixed: Any,
 ) -> Fit:
-    """k and mu0 of a contact, or one of them, from measured friction.
+    """Return k and mu0 of a contact, or one of them, from measured friction.
 
     Parameters
     ----------
@@ -106,8 +106,8 @@ class _Problem(Measured):
     """The search for the unknowns at which the model fits the points best."""
 
     def _profile(self, limit_of: Callable[[float], float]) -> Profile:
-        """Over k, over mu0 of a known k, or over k/mu0 with the best mu0; the last place of k is
-        rigid."""
+        """Profile chi2 over k, over mu0 of a known k, or over k/mu0 with the best mu0; the last
+        place of k is rigid."""
         has_factor = len(self.unknowns) == 2
         along = self.unknowns[0]
 
@@ -126,12 +126,13 @@ class _Problem(Measured):
         return Profile(model, self.weight * self.mu, has_factor, np.append(s, rigid), limit_of)
 
     def _ends_of_mu0(self) -> tuple[float, float]:
-        """Logarithms of a small and a large mu0, for a known k."""
+        """Return logarithms of a small and a large mu0, for a known k."""
         top = math.log(self.mu.max())
         return top + math.log(1e-3), top + math.log(1e6)
 
     def _ends_of_k(self, per_mu0: bool) -> tuple[float, float]:
-        """Logarithms of k, or of k/mu0, so soft that friction is mu0 and as good as rigid."""
+        """Return logarithms of k, or of k/mu0, so soft that friction is mu0 and as good as
+        rigid."""
         force, omega, v0 = (self.columns[name] for name in ("Fz", "omega", "v0"))
         with np.errstate(all="ignore"):
             speed_length = v0 / omega
@@ -204,7 +205,7 @@ class _Problem(Measured):
         )
 
     def _solutions(self, profile: Profile, barrier_at: Callable[[float], float]) -> list[_Minimum]:
-        """The minima that are allowed, best first.
+        """Return the minima that are allowed, best first.
 
         A minimum is a solution of its own if chi2 rises by at least one standard deviation on the
         way to every better solution; else it is a ripple of that one.
@@ -224,7 +225,7 @@ class _Problem(Measured):
         return solutions
 
     def _values_at(self, profile: Profile, sample: int) -> dict[str, float]:
-        """The unknowns at a sample."""
+        """Return the unknowns at a sample."""
         with np.errstate(over="ignore"):
             x, factor = float(np.exp(profile.at.s[sample])), float(profile.at.factor[sample])
         if len(self.unknowns) == 1:
@@ -234,13 +235,14 @@ class _Problem(Measured):
         return {name: values[name] for name in self.unknowns}
 
     def _log_slopes(self, values: Mapping[str, float]) -> Array:
-        """d(weighted mu_macro) / d ln(unknown), (points, unknowns); 0 for an infinite k."""
+        """Return d(weighted mu_macro) / d ln(unknown), (points, unknowns); 0 for an infinite k."""
         slopes = self.model(values, self.columns)[1]
         columns = [slopes[name] * (x if math.isfinite(x) else 0.0) for name, x in values.items()]
         return np.stack(columns, axis=-1) * self.weight[:, None]
 
     def _covariance(self, values: Mapping[str, float], variance: float) -> Array:
-        """Of the logarithms of the unknowns; infinite for one that the points do not determine."""
+        """Return that of the logarithms of the unknowns; infinite for one that the points do not
+        determine."""
         slopes = self._log_slopes(values)
         determined = np.abs(slopes).max(axis=0) > 1e-12 * np.abs(self.weight * self.mu).max()
         covariance = np.diag(np.where(determined, 0.0, math.inf))
@@ -259,8 +261,9 @@ class _Problem(Measured):
     def _interval(
         self, profile: Profile, solutions: Sequence[_Minimum], width: float, variance: float
     ) -> dict[str, tuple[float, float]]:
-        """What the profile of chi2 allows; of exact points, or without a measure of the error, what
-        the covariance says.  Any of the solutions may be the true contact: it covers them all."""
+        """Return what the profile of chi2 allows; of exact points, or without a measure of the
+        error, what the covariance says. Any of the solutions may be the true contact: it covers
+        them all."""
         half_widths = [
             width * np.sqrt(np.diag(self._covariance(one.values, variance))) for one in solutions
         ]
@@ -336,7 +339,7 @@ class _Problem(Measured):
 
 
 def _around(values: Mapping[str, float], half_widths: Array) -> dict[str, tuple[float, float]]:
-    """Intervals about values whose logarithms may be off by ``half_widths`` (unknowns,)."""
+    """Return intervals about values whose logarithms may be off by ``half_widths`` (unknowns,)."""
     with np.errstate(over="ignore"):
         return {
             name: (

@@ -97,7 +97,7 @@ class Fit(Result):
 
     @np.errstate(all="ignore")
     def predict(self, cases: Any = None, /, **inputs: Any) -> Prediction:
-        """mu_macro of the fit and its standard deviation, at the points or at other inputs.
+        """Return mu_macro of the fit and its standard deviation, at the points or at other inputs.
 
         Parameters
         ----------
@@ -141,8 +141,8 @@ class Fit(Result):
 
     @np.errstate(all="ignore")
     def curve(self) -> dict[str, Array] | None:
-        """The fitted law over v0 with its 95 % band: v0 [m/s], mu_macro, low and high [-], (n,);
-        None where other inputs vary, too, or v0 is 0 everywhere."""
+        """Return the fitted law over v0 with its 95 % band: v0 [m/s], mu_macro, low and high [-],
+        (n,); None where other inputs vary, too, or v0 is 0 everywhere."""
         inputs = dict(self._problem.columns)
         v0 = inputs.pop("v0")
         moving = v0[v0 > 0.0]
@@ -159,7 +159,7 @@ class Fit(Result):
         }
 
     def _members(self) -> dict[str, Any]:
-        """The word rigid stands for an infinite k."""
+        """Return the word rigid stands for an infinite k."""
         worded = {
             name: _worded(getattr(self, name))
             for name in ("values", "interval", "solutions", "points")
@@ -189,13 +189,13 @@ class Fit(Result):
         return {**self.points, "fitted": friction, "residual": self.residuals}
 
     def _width(self) -> float:
-        """Half width of a 95 % interval in standard deviations."""
+        """Return half width of a 95 % interval in standard deviations."""
         has_std = STD in self.points
         return quantile(None if has_std else self.residuals.size - len(self.values))
 
     def plot(self, ax: Any = None) -> Any:
-        """Points, fit and its 95 % band over the input that varies most, mostly v0, and below them
-        what the points deviate from the fit.
+        """Return points, fit and its 95 % band over the input that varies most, mostly v0, and
+        below them what the points deviate from the fit.
 
         Each set of the other inputs has a curve; more than 8 of them have no legend.  Where each
         point has a set of its own, such as its mu0, one curve goes through all of them, with the
@@ -227,7 +227,8 @@ class Fit(Result):
     def _curve(
         self, label: str, along: str, here: Bools, fine: Array, others: Mapping[str, Any]
     ) -> plotting.Curve:
-        """Points ``here``, and the fit over the values ``fine`` of an input beside the others."""
+        """Return points ``here``, and the fit over the values ``fine`` of an input beside the
+        others."""
         mu, deviation = self.predict(**{along: fine}, **others)
         bars = self.points[STD][here] if STD in self.points else None
         x, friction, residuals = (
@@ -259,7 +260,7 @@ class Fit(Result):
         return []
 
     def _in_full(self) -> tuple[str, Rows | None, list[str]]:
-        """The values with their deviations and intervals."""
+        """Return the values with their deviations and intervals."""
         rows: Rows = [
             (name, f"{x:.4g}", f"± {self.std[name]:.2g}", "95 %: {:.4g} to {:.4g}".format(*ends))
             for (name, x), ends in zip(self.values.items(), self.interval.values(), strict=True)
@@ -268,7 +269,7 @@ class Fit(Result):
 
 
 def _fine(x: Array) -> Array:
-    """Values between the points, and these, so dense that a curve over them is smooth."""
+    """Return values between the points, and these, so dense that a curve over them is smooth."""
     low = x[x > 0.0].min(initial=math.inf)
     if low == math.inf:
         return np.unique(x)
@@ -276,7 +277,7 @@ def _fine(x: Array) -> Array:
 
 
 def _interpolated(x: Array, column: Array, fine: Array) -> Any:
-    """An input of the points at other values of ``x``, smooth and monotone between them."""
+    """Return an input of the points at other values of ``x``, smooth and monotone between them."""
     if column.min() == column.max() or np.unique(x).size < 2:
         return float(column[0])
     from scipy.interpolate import PchipInterpolator
@@ -290,7 +291,7 @@ def _interpolated(x: Array, column: Array, fine: Array) -> Any:
 
 
 def _worded(part: Any, name: str = "") -> Any:
-    """A part of a fit, with the word rigid for an infinite k."""
+    """Return a part of a fit, with the word rigid for an infinite k."""
     if isinstance(part, Mapping):
         return {key: _worded(entry, key) for key, entry in part.items()}
     if isinstance(part, np.ndarray):

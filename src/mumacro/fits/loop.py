@@ -56,7 +56,7 @@ def fit_loop(
     contact: str = "spring",
     cycles: tuple[int, int] | None = None,
 ) -> LoopFit:
-    """k and mu0 of a contact from a loop of tangential force over displacement.
+    """Return k and mu0 of a contact from a loop of tangential force over displacement.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ class _Loop:
         self._set_out()
 
     def _take(self, x: Array, force: Array, load: Array, chosen: tuple[int, int] | None) -> None:
-        """The samples that are looked at, the cycles among them, and what counts."""
+        """Take the samples that are looked at, the cycles among them, and what counts."""
         found = cycles_of(x)
         part = slice(0, x.size)
         if chosen is not None:
@@ -173,13 +173,14 @@ class _Loop:
             self._note(_FIRST)
 
     def _is_first(self) -> bool:
-        """Whether the force of one closed cycle ends far from where it began."""
+        """Return whether the force of one closed cycle ends far from where it began."""
         step = float(np.abs(np.diff(self.force)).max()) if self.x[-1] != self.x[0] else 0.0
         gap = abs(float(self.force[-1] - self.force[0]))
         return gap > _GAP * float(np.ptp(self.force)) + step
 
     def _set_out(self) -> None:
-        """Offset and drift as columns, an orthonormal basis of them, and the force beside it."""
+        """Set out offset and drift as columns, an orthonormal basis of them, and the force
+        beside it."""
         n = self.x.size
         times = np.arange(n, dtype=np.float64)[self.counted]
         middle, half = 0.5 * (times[0] + times[-1]), max(0.5 * float(np.ptp(times)), 1.0)
@@ -197,11 +198,11 @@ class _Loop:
             raise InputError("displacement", f"{self.measured.size}", bound)
 
     def _aside(self, rows: Array) -> Array:
-        """Rows without what offset and drift can be."""
+        """Return rows without what offset and drift can be."""
         return np.ascontiguousarray(rows - (rows @ self.basis) @ self.basis.T)
 
     def _rows(self, p: Array, start: float) -> tuple[Array, Array]:
-        """Force over mu0 of all samples, and its slope along ln p, for p = k/mu0 (m,)."""
+        """Return force over mu0 of all samples, and its slope along ln p, for p = k/mu0 (m,)."""
         found = []
         for piece in np.array_split(p, 1 + p.size * self.x.size // _AT_ONCE):
             look()
@@ -210,8 +211,8 @@ class _Loop:
         return np.concatenate(forces), np.concatenate(slopes)
 
     def _profile(self, start: float, spare: float) -> Profile:
-        """Least chi2 over s = ln(k/mu0); ``spare`` is the rise that is allowed, as a share of the
-        variance about the fit."""
+        """Return least chi2 over s = ln(k/mu0); ``spare`` is the rise that is allowed, as a share
+        of the variance about the fit."""
 
         def model(s: Array, _slopes: bool) -> tuple[Array, Array]:
             rows, slopes = self._rows(np.exp(s), start)
@@ -231,7 +232,7 @@ class _Loop:
     # --- solution ---------------------------------------------------------------------------------
 
     def solve(self) -> LoopFit:
-        """The best k and mu0 with their intervals and notes."""
+        """Return the best k and mu0 with their intervals and notes."""
         width = quantile(self.dof)
         start, tau = 0.0, 1.0
         for _ in range(_STEPS):
@@ -282,8 +283,8 @@ class _Loop:
         )
 
     def _polished(self, s: float, mu0: float) -> tuple[float, float]:
-        """The minimum by Gauss and Newton, from a place nearby: the force is straight in k and mu0
-        between the samples that begin to slip."""
+        """Return the minimum by Gauss and Newton, from a place nearby: the force is straight in k
+        and mu0 between the samples that begin to slip."""
 
         def off(s: float, mu0: float) -> tuple[float, Array, Array, Array]:
             begin = float(self.force[0]) / mu0 if self.open else 0.0
@@ -312,29 +313,29 @@ class _Loop:
         return s, mu0
 
     def _linear(self, rows: Array, mu0: float) -> dict[str, float]:
-        """Offset at the first sample and drift a sample."""
+        """Return offset at the first sample and drift a sample."""
         if not self.names:
             return {}
         shares = np.linalg.lstsq(self.linear, self.measured - mu0 * rows[self.counted])[0]
         return dict(zip(self.names, self._in_samples(shares).tolist(), strict=True))
 
     def _in_samples(self, shares: Array) -> Array:
-        """Offset and drift a sample from the factors of their columns."""
+        """Return offset and drift a sample from the factors of their columns."""
         if len(self.names) < 2:
             return shares
         return np.array([shares[0] + self.first * shares[1], self.step * shares[1]])
 
     def _line(self, linear: dict[str, float]) -> Array:
-        """Offset and drift at all samples."""
+        """Return offset and drift at all samples."""
         times = np.arange(self.x.size) - (self.counted.start or 0)
         return np.asarray(linear.get("offset", 0.0) + linear.get("drift", 0.0) * times)
 
     def _sticks(self, slopes: Array) -> Bools:
-        """Which of the samples that count have not slipped in their step."""
+        """Return which of the samples that count have not slipped in their step."""
         return np.asarray(slopes[self.counted] != 0.0)
 
     def _energy(self, linear: dict[str, float]) -> float:
-        """The work of the force over a whole cycle [J], the mean of those that count."""
+        """Return the work of the force over a whole cycle [J], the mean of those that count."""
         if self.open:
             return math.nan
         force = self.force - self._line(linear)
@@ -394,7 +395,7 @@ class _Loop:
     def _linear_by_profile(
         self, profile: Profile, around: dict[str, tuple[float, float]]
     ) -> dict[str, tuple[float, float]]:
-        """Smallest and largest offset and drift among them."""
+        """Return smallest and largest offset and drift among them."""
         if not self.names:
             return {}
         allowed = np.flatnonzero(profile.at.chi2 <= profile.limit)
@@ -424,8 +425,8 @@ class _Loop:
     def _say_open_ends(
         self, values: dict[str, float], interval: dict[str, tuple[float, float]], sticks: Bools
     ) -> None:
-        """What the loop leaves open, as notes; an end that is open makes the value infinite where
-        nothing else can be said."""
+        """Say what the loop leaves open, as notes; an end that is open makes the value infinite
+        where nothing else can be said."""
         if interval["mu0"][1] == math.inf:
             least = interval["mu0"][0]
             self._note(f"the loop need not slip: mu0 has only a lower bound, {least:.4g} (95 %)")
@@ -446,7 +447,7 @@ class _Loop:
         sticks: Bools,
         variance: float,
     ) -> None:
-        """Notes of what the residuals say against the model."""
+        """Note what the residuals say against the model."""
         x, step = self.x[self.counted], np.diff(self.x, prepend=self.x[0])[self.counted]
         sign, speed = np.sign(step), np.abs(step)
         slips = ~sticks & (speed > 0.0)
@@ -455,8 +456,8 @@ class _Loop:
         load = mu0 * self.load
 
         def effect(regressor: Array, size: float) -> float:
-            """How large a share of mu0 Fz a regressor of the residuals has, 0 where that is not
-            sure."""
+            """Return how large a share of mu0 Fz a regressor of the residuals has, 0 where that is
+            not sure."""
             left = regressor - basis @ (basis.T @ regressor)
             square = float(left @ left)
             if not square > 1e-9 * float(regressor @ regressor) or not load > 0.0:
@@ -483,7 +484,7 @@ class _Loop:
 
 
 def _column(name: str, value: Any, quantity: str) -> Array:
-    """Finite numbers in the order of time, (n,), in SI."""
+    """Return finite numbers in the order of time, (n,), in SI."""
     column = np.ascontiguousarray(to_si(name, value, quantity))
     if column.ndim != 1 or not LEAST <= column.size <= MOST:
         bound = f"a column of {LEAST} to {MOST} samples: give some cycles, or each second sample"
@@ -495,7 +496,7 @@ def _column(name: str, value: Any, quantity: str) -> Array:
 
 
 def _whole(chosen: Any) -> tuple[int, int]:
-    """The first and the last cycle."""
+    """Return the first and the last cycle."""
     if (
         not isinstance(chosen, tuple | list)
         or len(chosen) != 2
@@ -506,8 +507,8 @@ def _whole(chosen: Any) -> tuple[int, int]:
 
 
 def _against(x: Array, force: Array) -> bool:
-    """Whether the force is against the displacement: both the work of a cycle and the correlation
-    are positive where it is along it."""
+    """Return whether the force is against the displacement: both the work of a cycle and the
+    correlation are positive where it is along it."""
     x, force = x - x.mean(), force - force.mean()
     work = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(x)))
     travelled = float(np.abs(np.diff(x)).sum())
@@ -516,8 +517,8 @@ def _against(x: Array, force: Array) -> bool:
 
 
 def _correlation(residuals: Array, dof: int, most: float) -> tuple[float, float]:
-    """By how much more the variance of a mean of residuals is than if they were independent, from 1
-    to ``most``, and the degrees of freedom that are left."""
+    """Return by how much more the variance of a mean of residuals is than if they were
+    independent, from 1 to ``most``, and the degrees of freedom that are left."""
     n = residuals.size
     spectrum = np.abs(np.fft.rfft(residuals, 2 * n)) ** 2
     covariance = np.fft.irfft(spectrum)[:n]

@@ -54,7 +54,7 @@ class LoopFit(Result):
     loop: dict[str, Array]
 
     def plot(self, ax: Any = None) -> Any:
-        """The measured loop and that of the model, and below them the residuals.
+        """Return the measured loop and that of the model, and below them the residuals.
 
         ``ax`` are two axes of matplotlib, or one, which gets no residuals, or new ones; the upper
         ones are returned.

@@ -43,7 +43,7 @@ def read_points(
     dialect: Dialect = Dialect(),  # noqa: B008
     most: Most = Most(),  # noqa: B008
 ) -> Table:
-    """Measured points in a table as text, or in a workbook: a file or its bytes.
+    """Return measured points in a table as text, or in a workbook: a file or its bytes.
 
     TextError tells what is wrong, and in which lines.
 
@@ -54,7 +54,7 @@ def read_points(
 
 
 def unknowns_beside(columns: Container[str]) -> list[str]:
-    """The unknowns by default: k and mu0, or k alone where mu0 is a column."""
+    """Return the unknowns by default: k and mu0, or k alone where mu0 is a column."""
     return [name for name in UNKNOWNS if name != "mu0" or name not in columns]
 
 
@@ -140,7 +140,7 @@ class Measured:
         return inputs
 
     def _read(self, data: dict[str, Any]) -> None:
-        """Columns of one length, (n,), in SI."""
+        """Read columns of one length, (n,), in SI."""
         columns = {name: to_si(name, data.pop(name)) for name in ("mu_macro", STD) if name in data}
         # labels are dropped: a fit is not labelled
         values = {name: to_si(name, x) for name, x in data.items()}
@@ -211,7 +211,7 @@ class Measured:
             _refuse("mu_macro", self.mu, self.mu <= top + scatter, bound)
 
     def remarks(self) -> list[Note]:
-        """What is probably a wrong unit in the points."""
+        """Return what is probably a wrong unit in the points."""
         doubts = remarks(self.columns, self._has_f)
         doubtful = self.mu > _PERCENT
         if not doubtful.any():
@@ -225,7 +225,8 @@ class Measured:
         return [Note(REMARK, text, UNITS, "mu_macro", cases=cases), *doubts]
 
     def elsewhere(self, cases: Any, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """The inputs of :meth:`model` at other places: those given, the others as at all points."""
+        """Return the inputs of :meth:`model` at other places: those given, the others as at all
+        points."""
         names = [*self.columns, "f"]
         for name in inputs:
             if name in self.unknowns:
@@ -266,7 +267,7 @@ class Measured:
     def model(
         self, values: Mapping[str, float], columns: Mapping[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        """mu_macro, and its slopes along the unknowns."""
+        """Return mu_macro, and its slopes along the unknowns."""
         inputs: dict[str, Any] = {**columns, **values, **self.kind.names}
         answer = self.surrogate.evaluate(**inputs, gradient=True)
         slopes = {
@@ -278,8 +279,8 @@ class Measured:
     def at(
         self, name: str, x: Array, mu0: Array | None = None, slopes: bool = True
     ) -> tuple[Array, Array]:
-        """mu_macro at values ``x`` (m,) of one unknown, and its slope along it, zero unless asked
-        for: (m, n) each; at ``mu0`` (m,) where that is unknown, too."""
+        """Return mu_macro at values ``x`` (m,) of one unknown, and its slope along it, zero unless
+        asked for: (m, n) each; at ``mu0`` (m,) where that is unknown, too."""
         rows = {name: x[:, None]} | ({} if mu0 is None else {"mu0": mu0[:, None]})
         inputs: dict[str, Any] = {**self.columns, **self.kind.names, **rows}
         answer = self.surrogate.evaluate(**inputs, gradient=slopes)
@@ -288,8 +289,8 @@ class Measured:
 
 
 def _friction(force: Any, load: Any) -> Any:
-    """mu_macro, as the friction force over the normal force; their deviations have no meaning
-    here."""
+    """Return mu_macro, as the friction force over the normal force; their deviations have no
+    meaning here."""
     if load is None:
         raise InputError("Fz", None, f"given beside {FORCE}: mu_macro is {FORCE}/Fz")
     above, below = np.asarray(to_si(FORCE, force)), np.asarray(to_si("Fz", load))
@@ -300,7 +301,7 @@ def _friction(force: Any, load: Any) -> Any:
 
 
 def _refuse(name: str, column: Array, legal: Bools, bound: str) -> None:
-    """An error for the first value that is not legal."""
+    """Refuse the first value that is not legal."""
     if not legal.all():
         index = int(np.argmin(legal))
         raise InputError(name, float(column[index]), bound, index)

@@ -52,7 +52,7 @@ _WITH_FACTOR: tuple[Goal, ...] = (
 
 
 def _dots(a: Array, b: Array) -> Array:
-    """The products of the rows of two arrays (m, n), (m,), without an array of this size."""
+    """Return the products of the rows of two arrays (m, n), (m,), without an array of this size."""
     return np.asarray(np.einsum("ij,ij->i", a, b))
 
 
@@ -106,7 +106,7 @@ class Profile:
         return self._limit_of(float(self.at.chi2.min()))
 
     def samples(self, s: Array, slopes: bool = True) -> Samples:
-        """The curve at places ``s`` (m,); slopes and tilt are zero unless asked for."""
+        """Return the curve at places ``s`` (m,); slopes and tilt are zero unless asked for."""
         rows, steps = self._model(s, slopes)
         squares = _dots(rows, rows)
         factor: Array = np.ones(s.size)
@@ -121,12 +121,12 @@ class Profile:
         return Samples(s, rows, steps, factor, chi2, tilt, rise)
 
     def lowest(self) -> Places:
-        """The samples that are minima."""
+        """Return the samples that are minima."""
         chi2 = np.concatenate(([np.inf], self.at.chi2, [np.inf]))
         return np.flatnonzero((chi2[1:-1] < chi2[:-2]) & (chi2[1:-1] <= chi2[2:]))
 
     def ridge(self, one: int, other: int) -> float:
-        """The largest chi2 on the way from one sample to another."""
+        """Return the largest chi2 on the way from one sample to another."""
         return float(self.at.chi2[min(one, other) : max(one, other) + 1].max())
 
     # --- sampling ---------------------------------------------------------------------------------
@@ -155,8 +155,8 @@ class Profile:
             self._insert(self.at.s[:-1][halved] + 0.5 * width[halved])
 
     def _chords(self) -> tuple[Array, Array, Array]:
-        """Of each chord: the distance of the measured point, how far the line may leave it, and its
-        width; (m - 1,) each."""
+        """Return of each chord the distance of the measured point, how far the line may leave
+        it, and its width; (m - 1,) each."""
         a, b = self.at.rows[:-1], self.at.rows[1:]
         chord, width = b - a, np.diff(self.at.s)
         m = self._measured
@@ -187,7 +187,8 @@ class Profile:
         return near, np.where(width > 0.0, error, 0.0), width
 
     def _minima(self) -> Array:
-        """Where chi2 turns from falling to rising, if that is allowed and more than a ripple."""
+        """Return where chi2 turns from falling to rising, if that is allowed and more than a
+        ripple."""
         near, error, width = self._chords()
         ripple = _RIPPLE * (self.limit - self.at.chi2.min())
         depth = self.at.tilt[:-1] * width, self.at.tilt[1:] * width
@@ -196,8 +197,8 @@ class Profile:
         return self._zeros(np.flatnonzero(turns), lambda at: at.tilt, 1e-13, slopes=True)
 
     def _lowest_places(self) -> Array:
-        """Where chi2 is least beside each sample that is a minimum and allowed: the curve may bend
-        between two samples, and its slope jump, so their slopes say nothing of it."""
+        """Return where chi2 is least beside each sample that is a minimum and allowed: the curve
+        may bend between two samples, and its slope jump, so their slopes say nothing of it."""
         s, here = self.at.s, self.lowest()
         here = here[(self.at.chi2[here] <= self.limit) & np.isfinite(s[here])]
         ends = np.flatnonzero(np.isfinite(s))[[0, -1]]
@@ -215,7 +216,7 @@ class Profile:
     def _zeros(
         self, chords: Places, quantity: Callable[[Samples], Array], tolerance: float, slopes: bool
     ) -> Array:
-        """Places in the chords at which a quantity passes through zero."""
+        """Return places in the chords at which a quantity passes through zero."""
         from scipy.optimize import brentq
 
         s, f = self.at.s.tolist(), quantity(self.at).tolist()
@@ -286,7 +287,7 @@ class Profile:
         return np.where(allowed, goal(at.s, at.factor, half_width), -np.inf)
 
     def _allowed_places(self, inside: Bools) -> Array:
-        """Finite places that are allowed, ascending: the samples, their borders, and some
+        """Return finite places that are allowed, ascending: the samples, their borders, and some
         between."""
         finite, limit = np.isfinite(self.at.s), self.limit
         crossings = np.flatnonzero((inside[:-1] != inside[1:]) & finite[1:])
@@ -298,7 +299,7 @@ class Profile:
 
 
 def quantile(dof: int | None) -> float:
-    """Half width of a 95 % interval in standard deviations: of Student's t, or of the normal
+    """Return half width of a 95 % interval in standard deviations: of Student's t, or of the normal
     distribution."""
     try:
         from scipy.special import ndtri, stdtrit

@@ -72,7 +72,7 @@ def units_of_fields(schema: Any) -> dict[str, str]:
 
 
 def _unit_of_quantity(value: Any) -> Any:
-    """The unit of a quantity of pint, astropy, unyt and others like them."""
+    """Return the unit of a quantity of pint, astropy, unyt and others like them."""
     for attribute in ("units", "unit"):
         unit = getattr(value, attribute, None)
         if unit is not None and not callable(unit) and unit is not value:
@@ -160,7 +160,7 @@ def without_mask(value: Any) -> Any:
 
 
 def _magnitude(value: Any) -> Any:
-    """The number of a quantity, without its unit."""
+    """Return the number of a quantity, without its unit."""
     for attribute in ("magnitude", "value", "values"):
         number = getattr(value, attribute, None)
         if number is not None and not callable(number):
@@ -169,7 +169,7 @@ def _magnitude(value: Any) -> Any:
 
 
 def _numbers(value: Any) -> Any:
-    """What a value that carries a unit holds, without labels and unit."""
+    """Return what a value that carries a unit holds, without labels and unit."""
     package = library(value)
     if package == "pandas":
         array = value.array
@@ -183,7 +183,7 @@ def _numbers(value: Any) -> Any:
 
 
 def _text_of(unit: Any) -> str:
-    """A unit as text: short where its library can write it so."""
+    """Return a unit as text: short where its library can write it so."""
     if isinstance(unit, str):
         return unit
     try:
@@ -193,7 +193,7 @@ def _text_of(unit: Any) -> str:
 
 
 def _converted(value: Any, text: str, unit: str, quantity: str) -> Any:
-    """A quantity that its own library has converted to an SI unit; None where it cannot be.
+    """Return a quantity that its own library has converted to an SI unit; None where it cannot be.
 
     For a frequency libraries take a radian, and a turn, as a plain 1: a factor of 2 pi.
     """
@@ -224,7 +224,7 @@ def _bound(quantity: str, value: Any, unit: str) -> str:
 
 
 def _shown(value: Any, unit: str) -> str:
-    """A quantity in a message."""
+    """Return a quantity in a message."""
     try:
         return f"{float(_numbers(value)):.12g} {unit or 'without dimension'}"
     except (TypeError, ValueError):

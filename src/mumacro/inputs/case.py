@@ -129,7 +129,7 @@ def read(name: str, value: Any, quantity: str = "") -> Value:
 
 
 def _array(name: str, value: Any) -> Any:
-    """A value of any type as NumPy sees it."""
+    """Return a value of any type as NumPy sees it."""
     if isinstance(value, (bytes, bytearray, Mapping, set, frozenset)):
         raise InputError(name, value, A_NUMBER)
     try:
@@ -139,8 +139,8 @@ def _array(name: str, value: Any) -> Any:
 
 
 def is_gap(value: Any) -> bool:
-    """Whether a value says that there is none: None, an empty text, NA and NaT of pandas, a masked
-    entry."""
+    """Return whether a value says that there is none: None, an empty text, NA and NaT of pandas, a
+    masked entry."""
     if value is None or value is np.ma.masked or type(value).__name__ in _GAPS:
         return True
     return isinstance(value, str) and not value.strip()
@@ -208,7 +208,7 @@ def other_number(name: str, value: Any, index: int | None = None) -> float:
 
 @functools.lru_cache(4096)
 def _of_text(name: str, quantity: str, raw: str) -> Value:
-    """A value as a person types it."""
+    """Return a value as a person types it."""
     if len(raw) > LONGEST:
         raise InputError(name, f"{raw[:40]}…", "a number, with or without a unit")
     text = tidy(raw)
@@ -239,7 +239,7 @@ def _of_text(name: str, quantity: str, raw: str) -> Value:
 
 
 def _of_no_number(quantity: str, reason: str) -> str:
-    """The bound where a text has no number, or may have two."""
+    """Return the bound where a text has no number, or may have two."""
     about, reason = QUANTITIES[quantity], reason.removeprefix("must be ")
     if reason != "a number":
         return f"one number: it {reason}" if reason.startswith(("is ", "may ")) else reason
@@ -271,7 +271,7 @@ def _scale_or_refuse(name: str, quantity: str, raw: str, number: float, unit: st
 
 
 def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) -> Value:
-    """``1 ± 0.1 N/um``, ``1 N/um ± 10 %``, ``1 ± 10 % N/um``, ``(1 ± 0.1) N/um``."""
+    """Return ``1 ± 0.1 N/um``, ``1 N/um ± 10 %``, ``1 ± 10 % N/um``, ``(1 ± 0.1) N/um``."""
     together, outside = text.startswith("("), ""
     if together:
         inside, _, outside = text[1:].partition(")")
@@ -299,7 +299,7 @@ def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) ->
 
 
 def _interval(name: str, quantity: str, raw: str, text: str) -> Value:
-    """``0.8..1.2 N/um``; a unit behind the second end holds for both."""
+    """Return ``0.8..1.2 N/um``; a unit behind the second end holds for both."""
     if name != "k":
         raise InputError(name, raw, _ONE_NUMBER)
     left, _, right = text.partition("..")

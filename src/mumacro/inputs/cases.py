@@ -206,7 +206,7 @@ class Cases(NamedTuple):
 
 
 def named(cases: Any, keywords: Mapping[str, Any]) -> dict[str, Any]:
-    """The inputs and options of ``cases`` and those given by keyword, each once, by name.
+    """Return the inputs and options of ``cases`` and those given by keyword, each once, by name.
 
     Of a mapping every name must be one of :data:`COLUMNS` or :data:`OPTIONS`; of a data frame, an
     Arrow table or a Dataset other columns are ignored, and refused only where one resembles an
@@ -246,7 +246,7 @@ def one_word(name: str, column: Any) -> Any:
 
 
 def _select(cases: Any) -> tuple[dict[str, Any], list[str]]:
-    """What ``cases`` hold by known names, and the names of the rest."""
+    """Return what ``cases`` hold by known names, and the names of the rest."""
     if isinstance(cases, Mapping) and not library_of(cases):  # a Dataset is a mapping, too
         for name in cases.keys() - {*COLUMNS, *OPTIONS}:
             raise no_such_input(str(name), cases[name])
@@ -256,7 +256,7 @@ def _select(cases: Any) -> tuple[dict[str, Any], list[str]]:
 
 
 def no_such_input(name: str, value: Any, allowed: Iterable[str] = COLUMNS) -> InputError:
-    """The error for a name that is none of ``allowed``."""
+    """Return the error for a name that is none of ``allowed``."""
     names = [name for name in allowed if name not in DEVIATIONS]
     if (bound := in_place_of(name, allowed)) is not None:
         return InputError(name, value, bound)
@@ -284,15 +284,15 @@ def _refuse_similar(rest: Iterable[str], values: Mapping[str, Any]) -> None:
 
 
 def select(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Those of ``names`` that a mapping, a data frame or one row of it, an Arrow table or stream,
-    or a Dataset has."""
+    """Return those of ``names`` that a mapping, a data frame or one row of it, an Arrow table or
+    stream, or a Dataset has."""
     return _columns_in(argument, cases, names)[0]
 
 
 def _columns_in(
     argument: str, cases: Any, names: Iterable[str]
 ) -> tuple[dict[str, Any], Iterable[str]]:
-    """The columns of these names, and the names of all columns."""
+    """Return the columns of these names, and the names of all columns."""
     if library_of(cases) == "pandas" and not hasattr(cases, "columns"):  # one row of a frame
         cases = cases.to_dict()
     # a stream of batches has no columns by name
@@ -341,8 +341,8 @@ def _columns_in(
 
 
 def library_of(value: Any) -> str:
-    """The library whose labels or chunks a value has: pandas, xarray, dask; or nothing, also for an
-    index or one value of pandas."""
+    """Return the library whose labels or chunks a value has: pandas, xarray, dask; or nothing, also
+    for an index or one value of pandas."""
     name = type(value).__module__.partition(".")[0]
     if name == "pandas":
         return name if hasattr(type(value), "iloc") else ""
@@ -350,14 +350,14 @@ def library_of(value: Any) -> str:
 
 
 def has_labels(values: Iterable[Any]) -> bool:
-    """Whether the answer is labelled, since an input is."""
+    """Return whether the answer is labelled, since an input is."""
     types = {*map(type, values)}
     return not types <= _UNLABELLED and any(map(library_of, values))
 
 
 def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> dict[str, float]:
-    """The inputs of one case beside the unknown or swept one, by the names of ``kind.fields``; an
-    infinite ``k`` is rigid.
+    """Return the inputs of one case beside the unknown or swept one, by the names of
+    ``kind.fields``; an infinite ``k`` is rigid.
 
     ``f`` may stand for ``omega``; inputs that are None are left out.  InputError where one of the
     five is missing or is not one legal number, and where the unknown has a value.
@@ -431,12 +431,12 @@ def no_interval(low: float, high: float, index: int | None = None) -> InputError
 
 
 def is_interval(low: Any, high: Any) -> Any:
-    """Whether two stiffnesses are the ends of an interval."""
+    """Return whether two stiffnesses are the ends of an interval."""
     return np.greater(low, 0.0) & np.less_equal(low, high) & np.less(high, math.inf)
 
 
 def middle(low: Any, high: Any) -> float | Array:
-    """The geometric middle of intervals, NaN where one is none."""
+    """Return the geometric middle of intervals, NaN where one is none."""
     legal = is_interval(low, high)
     lower, upper = (np.where(legal, end, math.nan) for end in (low, high))
     inside = np.clip(np.sqrt(lower) * np.sqrt(upper), lower, upper)
@@ -446,7 +446,8 @@ def middle(low: Any, high: Any) -> float | Array:
 def without_interval(
     case: Mapping[str, Any], along: str = ""
 ) -> tuple[Mapping[str, Any], dict[str, Any]]:
-    """A case with the middle of an interval of k, and the two ends; no ends where it has one k.
+    """Return a case with the middle of an interval of k, and the two ends; no ends where it has one
+    k.
 
     InputError for an interval where k itself is swept.
     """
@@ -467,8 +468,8 @@ def without_interval(
 
 
 def columns_of(values: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, float | Array]:
-    """The six inputs by the names of ``kind.fields``, each one number or an array of float64,
-    exact.
+    """Return the six inputs by the names of ``kind.fields``, each one number or an array of
+    float64, exact.
 
     InputError where one is missing, is given twice, is no real number, has a deviation, or is the
     amplitude of another direction.
@@ -503,7 +504,7 @@ class _Inputs(NamedTuple):
 
 
 def _understood(name: str, value: Any, gaps: _Gaps) -> Value:
-    """One value, or the numbers of a column, whose gaps go into ``gaps``."""
+    """Return one value, or the numbers of a column, whose gaps go into ``gaps``."""
     if not is_column(value):
         return read(name, value)
     column = read_column(name, value)
@@ -513,7 +514,7 @@ def _understood(name: str, value: Any, gaps: _Gaps) -> Value:
 
 
 def _by_case(gaps: _Gaps, shape: tuple[int, ...], strict: bool) -> dict[str, dict[int, Fault]]:
-    """The gaps of columns by the cases that they spoil; InputError for the first, where
+    """Return the gaps of columns by the cases that they spoil; InputError for the first, where
     ``strict``."""
     faults = {}
     for name, (column, of_column) in gaps.items():
@@ -529,7 +530,7 @@ def _by_case(gaps: _Gaps, shape: tuple[int, ...], strict: bool) -> dict[str, dic
 
 
 def _inputs(values: Mapping[str, Any], fields: tuple[str, ...]) -> _Inputs:
-    """The inputs of these names."""
+    """Return the inputs of these names."""
     columns: _Numbers = {}
     units: dict[str, str] = {}
     std: _Numbers = {}
@@ -568,8 +569,8 @@ def _inputs(values: Mapping[str, Any], fields: tuple[str, ...]) -> _Inputs:
 def _deviations(
     values: Mapping[str, Any], fields: tuple[str, ...], within: Mapping[str, Any], gaps: _Gaps
 ) -> _Numbers:
-    """The deviations that are given beside the values, by field; ``within`` are those that stand in
-    the values themselves, and the gaps of columns go into ``gaps``."""
+    """Return the deviations that are given beside the values, by field; ``within`` are those that
+    stand in the values themselves, and the gaps of columns go into ``gaps``."""
     std: _Numbers = {}
     for column in [column for column in DEVIATIONS if column in values]:
         name = DEVIATIONS[column]
@@ -605,8 +606,8 @@ def other_amplitude(name: str, value: Any, kind: Kind) -> InputError:
 
 
 def _flat_ends(ends: tuple[Any, Any], shape: tuple[int, ...], strict: bool) -> tuple[Array, Array]:
-    """Both ends of the interval of every case, (n,); InputError for the first that is none, where
-    ``strict``."""
+    """Return both ends of the interval of every case, (n,); InputError for the first that is none,
+    where ``strict``."""
     low, high = (flat(np.asarray(end), shape or (1,)) for end in ends)
     if strict:
         for index in np.flatnonzero(~is_interval(low, high) & ~np.isinf(low)).tolist():
@@ -616,14 +617,14 @@ def _flat_ends(ends: tuple[Any, Any], shape: tuple[int, ...], strict: bool) -> t
 
 
 def _of_all(x: float | Array, shape: tuple[int, ...]) -> float | Array:
-    """A column as one number, or flat with one for each case."""
+    """Return a column as one number, or flat with one for each case."""
     if not isinstance(x, np.ndarray):
         return x
     return flat(x, shape) if x.size != 1 else x.item()
 
 
 def _shape_of(columns: _Numbers, std: _Numbers) -> tuple[int, ...]:
-    """The shape to which all columns broadcast; InputError where they do not."""
+    """Return the shape to which all columns broadcast; InputError where they do not."""
     arrays = [x for x in (*columns.values(), *std.values()) if isinstance(x, np.ndarray)]
     try:
         return common_shape(arrays) if arrays else ()
@@ -633,7 +634,7 @@ def _shape_of(columns: _Numbers, std: _Numbers) -> tuple[int, ...]:
 
 
 def _missing(values: Mapping[str, Any], fields: tuple[str, ...]) -> InputError:
-    """What to give, where ``values`` lack one or more of the inputs."""
+    """Return what to give, where ``values`` lack one or more of the inputs."""
     frequency = {name for name in ("omega", "f") if values.get(name) is not None}
     present = {*values} - {"omega"} | ({"omega"} if frequency else set())
     absent = [name for name in fields if name not in present]
@@ -650,12 +651,13 @@ def _missing(values: Mapping[str, Any], fields: tuple[str, ...]) -> InputError:
 
 @np.errstate(over="ignore")  # takes less time than a with statement within
 def _angular(frequency: float | Array) -> float | Array:
-    """omega [rad/s] of f [Hz]; beyond double range infinite, which is refused as a value of f."""
+    """Return omega [rad/s] of f [Hz]; beyond double range infinite, which is refused as a value of
+    f."""
     return frequency * RAD_PER_CYCLE
 
 
 def _frequency_in(values: Mapping[str, Any], fields: tuple[str, ...]) -> str:
-    """Which of omega and f the values have."""
+    """Return which of omega and f the values have."""
     if values.get("f") is None:
         if values.get("omega") is None:
             raise _missing(values, fields)
@@ -702,7 +704,7 @@ def check(
 
 
 def _first_case(illegal: Any, shape: tuple[int, ...]) -> int | None:
-    """The first case with an illegal value; None for one value that is in all cases."""
+    """Return the first case with an illegal value; None for one value that is in all cases."""
     if not illegal.ndim:
         return None
     cases = np.flatnonzero(np.broadcast_to(illegal, shape or illegal.shape))

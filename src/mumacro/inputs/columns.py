@@ -61,7 +61,7 @@ class Column(NamedTuple):
 
 
 def is_column(value: Any) -> bool:
-    """Whether a value is an array of some library, a list or a tuple: not one value alone.
+    """Return whether a value is an array of some library, a list or a tuple: not one value alone.
 
     >>> is_column([1.0]), is_column(np.float64(1.0)), is_column("1"), is_column(np.array(1.0))
     (True, False, False, False)
@@ -160,7 +160,7 @@ def refuse_gaps(name: str, column: Column) -> None:
 
 
 def same_unit(name: str, one: str, other: str) -> bool:
-    """Whether two units of an input have one scale.
+    """Return whether two units of an input have one scale.
 
     >>> same_unit("v0", "mm/s", "mm s^-1"), same_unit("v0", "mm/s", "m/s")
     (True, False)
@@ -198,7 +198,7 @@ def in_unit(name: str, value: Any, unit: str) -> Any:
 
 
 def _doubles(name: str, values: Any, quantity: str) -> tuple[Array, dict[int, Fault]]:
-    """The numbers of a column without a unit, and its gaps."""
+    """Return the numbers of a column without a unit, and its gaps."""
     values = without_mask(values)
     if isinstance(values, (list, tuple)):
         shape, entries = _entries(name, values)
@@ -220,7 +220,7 @@ def _doubles(name: str, values: Any, quantity: str) -> tuple[Array, dict[int, Fa
 
 
 def _array(name: str, values: Any) -> Any:
-    """An array of NumPy of a container."""
+    """Return an array of NumPy of a container."""
     package = library(values)
     if package == "pandas":
         if hasattr(values, "columns"):
@@ -249,8 +249,8 @@ def as_doubles(name: str, array: Any) -> Array:
 
 
 def _entries(name: str, value: Sequence[Any]) -> tuple[tuple[int, ...], list[Any]]:
-    """Shape and entries of nested lists; InputError for lists of several lengths, and for an array
-    with a unit within a list."""
+    """Return shape and entries of nested lists; InputError for lists of several lengths, and for an
+    array with a unit within a list."""
     if not any(map(_is_row, value)):
         return (len(value),), list(value)
     try:
@@ -266,7 +266,7 @@ def _entries(name: str, value: Sequence[Any]) -> tuple[tuple[int, ...], list[Any
 
 
 def _is_row(value: Any) -> bool:
-    """Whether an entry of a list is a list or an array itself."""
+    """Return whether an entry of a list is a list or an array itself."""
     if isinstance(value, (list, tuple)):
         return True
     dimensions = getattr(value, "ndim", 0)
@@ -276,7 +276,7 @@ def _is_row(value: Any) -> bool:
 def _of_entries(
     name: str, values: Any, entries: Sequence[Any], shape: tuple[int, ...], quantity: str
 ) -> tuple[Array, dict[int, Fault]]:
-    """Entries of several types, one after the other."""
+    """Return entries of several types, one after the other."""
     si, faults = np.full(len(entries), math.nan), dict[int, Fault]()
     or_rigid = quantity in OR_RIGID and not name.startswith("std_")
     numbers = texts = 0
@@ -308,7 +308,7 @@ def _of_entries(
 
 
 def _number(name: str, entry: Any, index: int) -> float:
-    """A number of another type, such as Decimal; InputError for what is none."""
+    """Return a number of another type, such as Decimal; InputError for what is none."""
     if carried_unit(entry) is not None:
         bound = "numbers: the unit belongs to the whole column, as that of a quantity array"
         raise InputError(name, entry, bound, index)

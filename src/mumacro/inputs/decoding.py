@@ -62,7 +62,7 @@ class TextError(MumacroError, ValueError):
 
     @classmethod
     def of(cls, faults: Sequence[str]) -> "TextError":
-        """An error that tells the first faults."""
+        """Return an error that tells the first faults."""
         more = f"; and {len(faults) - _SHOWN:,} more" if len(faults) > _SHOWN else ""
         error = cls("; ".join(faults[:_SHOWN]) + more)
         error.faults = faults
@@ -82,8 +82,8 @@ class Piece(NamedTuple):
 
 
 def encoding_of(name: str) -> str:
-    """The encoding that a person names, as Python calls it; TextError where there is none of this
-    name.
+    """Return the encoding that a person names, as Python calls it; TextError where there is none of
+    this name.
 
     >>> encoding_of("Windows-1252"), encoding_of("UTF8")
     ('cp1252', 'utf-8')
@@ -102,8 +102,8 @@ def encoding_of(name: str) -> str:
 def file_pieces(
     path: Path, report_place: Callable[[int], None] = lambda _at: None
 ) -> Iterator[bytes]:
-    """The bytes of a file in pieces, also of a compressed one (.gz); ``report_place`` is told how
-    far the file is read.  TextError where a compressed one is damaged."""
+    """Yield the bytes of a file in pieces, also of a compressed one (.gz); ``report_place`` is told
+    how far the file is read. TextError where a compressed one is damaged."""
     try:
         with path.open("rb") as raw:
             stream: Any = gzip.GzipFile(fileobj=raw) if path.name.lower().endswith(".gz") else raw
@@ -155,13 +155,13 @@ class Text:
         return self._piece(last.removesuffix("\n"))
 
     def _piece(self, text: str) -> Piece:
-        """The next lines, which are whole."""
+        """Return the next lines, which are whole."""
         first = self._lines + 1
         self._lines += text.count("\n") + 1
         return Piece(first, text)
 
     def _decoded(self, data: bytes, final: bool = False) -> str:
-        """The text of some bytes, whose lines end in line feeds."""
+        """Return the text of some bytes, whose lines end in line feeds."""
         if self._decoder is None:
             self._decoder = self._begin(data)
         try:
@@ -176,7 +176,8 @@ class Text:
         return text
 
     def _begin(self, data: bytes) -> codecs.IncrementalDecoder:
-        """The decoder for the first bytes, which tell the encoding; what is no text is refused."""
+        """Return the decoder for the first bytes, which tell the encoding; what is no text is
+        refused."""
         for begin, what in _OTHERS:
             if data.startswith(begin):
                 raise TextError(f"it {what}")
@@ -195,7 +196,7 @@ class Text:
         return codecs.getincrementaldecoder(self.encoding)("strict")
 
     def _in_windows_1252(self, error: UnicodeDecodeError, final: bool) -> str:
-        """The text of bytes that are not UTF-8, if they may be Windows-1252."""
+        """Return the text of bytes that are not UTF-8, if they may be Windows-1252."""
         data = error.object
         unknown = self._codec_of_caller is None and self.encoding == "utf-8"
         if unknown and self._ascii and data[: error.start].isascii():
@@ -213,7 +214,7 @@ class Text:
 
 
 def _with_start(pieces: Iterable[bytes]) -> Iterator[bytes]:
-    """The pieces, the first of them long enough to know the encoding by."""
+    """Yield the pieces, the first of them long enough to know the encoding by."""
     start = b""
     for piece in (rest := iter(pieces)):
         start += piece
@@ -224,7 +225,7 @@ def _with_start(pieces: Iterable[bytes]) -> Iterator[bytes]:
 
 
 def _of_zeros(data: bytes) -> str | None:
-    """The encoding of two bytes a character, where every other byte is mostly zero."""
+    """Return the encoding of two bytes a character, where every other byte is mostly zero."""
     half = len(data) // 2
     low, high = data[::2].count(0), data[1::2].count(0)
     if half < 2 or max(low, high) < 0.7 * half or min(low, high) > 0.1 * half:

@@ -146,7 +146,7 @@ def remarks_on_motion(
 
 
 def _of_still(six: Mapping[str, Array], frequency: bool) -> list[Note]:
-    """What is said of legal contacts that are not shaken, by the input that is 0."""
+    """Return what is said of legal contacts that are not shaken, by the input that is 0."""
     legal = (six["mu0"] > 0.0) & (six["Fz"] > 0.0) & (six["k"] > 0.0) & (six["v0"] >= 0.0)
     legal &= np.isfinite(six["mu0"]) & np.isfinite(six["Fz"]) & np.isfinite(six["v0"])
     found: list[Note] = []
@@ -161,8 +161,8 @@ def _of_still(six: Mapping[str, Array], frequency: bool) -> list[Note]:
 
 
 def _usual(columns: Mapping[str, Any]) -> bool:
-    """Whether one case in plain numbers oscillates across or along within all usual ranges: looked
-    up in a microsecond."""
+    """Return whether one case in plain numbers oscillates across or along within all usual ranges:
+    looked up in a microsecond."""
     mu0, load, k, y0, omega, v0 = map(columns.get, ("mu0", "Fz", "k", "y0", "omega", "v0"))
     if not (type(mu0) is type(load) is type(k) is type(y0) is type(omega) is type(v0) is float):
         return False
@@ -188,7 +188,7 @@ def _usual(columns: Mapping[str, Any]) -> bool:
 
 
 def _out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
-    """Every input, and where it is outside its usual range; a rigid contact, zero where it is
+    """Yield every input, and where it is outside its usual range; a rigid contact, zero where it is
     legal, and what is not legal are not."""
     for name, (least, most) in _USUAL.items():
         column = six[name]
@@ -197,7 +197,8 @@ def _out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
 
 
 def _groups_out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
-    """l0, y~, v~ and the peak speed, and where no contact has them; of legal contacts alone."""
+    """Yield l0, y~, v~ and the peak speed, and where no contact has them; of legal contacts
+    alone."""
     length = six["mu0"] * six["Fz"] / six["k"]
     elastic = (length > 0.0) & (six["Fz"] > 0.0) & (six["k"] > 0.0)
     moves = _oscillates(six) & elastic
@@ -219,7 +220,7 @@ def _sentence(
     units: Mapping[str, "_Unit"],
     names: Mapping[str, str],
 ) -> tuple[str, str]:
-    """The input that is doubted, and why, of one case."""
+    """Return the input that is doubted, and why, of one case."""
     length = case["mu0"] * case["Fz"] / case["k"] if case["k"] else math.inf
     swing = names.get("y0", "y0")
 
@@ -264,8 +265,8 @@ _CONTACTS = "contacts have 0.01 to 100"
 
 
 def _is(name: str, word: str, value: float, units: Mapping[str, "_Unit"]) -> str:
-    """The question whether the value of an input, which is called a ``word``, is right; of a number
-    without a unit, whether it is in SI."""
+    """Return the question whether the value of an input, which is called a ``word``, is right; of a
+    number without a unit, whether it is in SI."""
     if name in units:
         return f"is {word} = {units[name].text(value)} right?"
     return f"is {word} = {plain(value, 6)} in {INPUTS[name].unit}?"
@@ -278,29 +279,30 @@ class _Unit(NamedTuple):
     scale: Scale
 
     def number(self, value: float) -> str:
-        """A value in SI as a number of this unit."""
+        """Return a value in SI as a number of this unit."""
         return plain(self.scale.of_si(value), 6)
 
     def text(self, value: float) -> str:
-        """The same with the unit."""
+        """Return the same with the unit."""
         return f"{self.number(value)} {self.name}".rstrip()
 
 
 def _largest(case: Mapping[str, float], *names: str) -> str:
-    """The input, of these, which is furthest above what contacts have."""
+    """Return the input, of these, which is furthest above what contacts have."""
     return max(names, key=lambda name: case[name] / _LARGE[name])
 
 
 def _stiff_or(case: Mapping[str, float], other: str) -> str:
-    """The input, of those that make a group large, which is furthest from what contacts have."""
+    """Return the input, of those that make a group large, which is furthest from what contacts
+    have."""
     name = _largest(case, other, "k")
     lightness = _SMALL_LOAD / case["Fz"]
     return "Fz" if lightness > case[name] / _LARGE[name] else name
 
 
 def _of_rigid(stiffness: float, cases: int = 1) -> Note:
-    """What a rigid contact assumes, with the stiffness that must be far exceeded for it [N/m]; of
-    many cases the largest."""
+    """Return what a rigid contact assumes, with the stiffness that must be far exceeded for it
+    [N/m]; of many cases the largest."""
     text = "rigid: the contact does not stretch before it slips"
     if math.isfinite(stiffness):
         text += (

@@ -126,7 +126,7 @@ QUANTITY_OF = {row.name: row.quantity for row in _ROWS} | {
 
 
 def is_rigid(text: object) -> bool:
-    """Whether a text says that the contact is rigid.
+    """Return whether a text says that the contact is rigid.
 
     >>> is_rigid(" Rigid "), is_rigid(""), is_rigid(1.0)
     (True, False, False)
@@ -135,7 +135,7 @@ def is_rigid(text: object) -> bool:
 
 
 def unit_of(name: str) -> str:
-    """The SI unit of an input, or of one in its place.
+    """Return the SI unit of an input, or of one in its place.
 
     >>> unit_of("k_low"), unit_of("f")
     ('N/m', 'Hz')
@@ -144,7 +144,7 @@ def unit_of(name: str) -> str:
 
 
 def described(name: str, more: str = "") -> str:
-    """What an input is, with its unit, as descriptions have it.
+    """Return what an input is, with its unit, as descriptions have it.
 
     >>> described("v0"), described("f", ", in place of omega")
     ('Sliding speed [m/s]', 'Frequency of the oscillation [Hz], in place of omega')
@@ -153,7 +153,7 @@ def described(name: str, more: str = "") -> str:
 
 
 def in_help(name: str) -> str:
-    """The same within a sentence, with the bound.
+    """Return the same within a sentence, with the bound.
 
     >>> in_help("mu0"), in_help("v0")
     ('Coulomb friction coefficient of the contact [-], > 0', 'sliding speed [m/s], >= 0')
@@ -164,7 +164,7 @@ def in_help(name: str) -> str:
 
 
 def field_of(name: str) -> tuple[str, float]:
-    """The field behind the name of an input, and its value for one unit of the name.
+    """Return the field behind the name of an input, and its value for one unit of the name.
 
     >>> field_of("f"), field_of("y0")
     (('omega', 6.283185307179586), ('y0', 1.0))
@@ -173,8 +173,8 @@ def field_of(name: str) -> tuple[str, float]:
 
 
 def refusal(name: str, value: float) -> str:
-    """Why ``value`` is no legal value of an input; NaN stands for a gap, which is never a rigid
-    contact.
+    """Return why ``value`` is no legal value of an input; NaN stands for a gap, which is never a
+    rigid contact.
 
     >>> refusal("v0", -1.0), refusal("k", math.nan)
     ('must be finite and >= 0', 'is missing; write rigid or a number')

@@ -15,8 +15,8 @@ _WITH_UNIT = re.compile(r"(\w+)(?: ?/ ?| in |, ?)(\S.*)")
 
 
 def heading(cell: str, like: Mapping[str, str]) -> str:
-    """A head as it stands in a table, on one line, with its unit in brackets if it names one of
-    ``like``.
+    """Return a head as it stands in a table, on one line, with its unit in brackets if it names one
+    of ``like``.
 
     >>> heading("v0 / (mm/s)", {"v0": "v0"}), heading("run / day", {"v0": "v0"})
     ('v0 [mm/s]', 'run / day')
@@ -33,7 +33,7 @@ def heading(cell: str, like: Mapping[str, str]) -> str:
 def find_heads(
     heads: Sequence[str], like: Mapping[str, str]
 ) -> tuple[dict[str, tuple[int, Scale]], list[str]]:
-    """The place and unit of each column by name, and the faults of the heads.
+    """Return the place and unit of each column by name, and the faults of the heads.
 
     ``like`` has the names of the columns, and for each the input whose units it has; other columns
     are left out.
@@ -61,7 +61,8 @@ def find_heads(
 
 
 def _no_unit(name: str, unit: str, like: Mapping[str, str]) -> str:
-    """Why a unit of a column is refused, with the number to give where it is clear what is meant.
+    """Return why a unit of a column is refused, with the number to give where it is clear what is
+    meant.
 
     >>> _no_unit("y0", "um pp", {"y0": "y0"})
     'y0 cannot have: it must be half of peak to peak: give 0.5um in place of 1 um pp'
@@ -76,7 +77,7 @@ def _no_unit(name: str, unit: str, like: Mapping[str, str]) -> str:
 
 
 def meant_by(head: str, *, loosely: bool = True) -> str | None:
-    """The input that a head probably stands for, as a whole or by its first word: k for
+    """Return the input that a head probably stands for, as a whole or by its first word: k for
     ``k_N_per_mm``."""
     name = split_unit(head)[0]
     first = re.split(r"[\W_]+", name.strip("_ "))[0]
@@ -105,7 +106,7 @@ def absent(names: Sequence[str], heads: Sequence[str]) -> str:
 
 
 def _listed(heads: Sequence[str]) -> str:
-    """The heads for a message of bounded length."""
+    """Return the heads for a message of bounded length."""
     text = ", ".join(
         repr(head if len(head) <= 80 else f"{head[:77]}...") for head in heads[:_LISTED]
     )
@@ -114,14 +115,14 @@ def _listed(heads: Sequence[str]) -> str:
 
 
 def _heading(name: str) -> str:
-    """The heading that a column of an input has, in SI units."""
+    """Return the heading that a column of an input has, in SI units."""
     heading = f"{name} [{unit_in_si(name)}]"
     more = {"omega": " or f [Hz]", "mu_macro": " (the mean friction force over Fz)"}
     return heading + more.get(name, "")
 
 
 def unit_in_si(name: str) -> str:
-    """The SI unit of a column.
+    """Return the SI unit of a column.
 
     >>> unit_in_si("k_low"), unit_in_si("mu_macro")
     ('N/m', '-')
@@ -130,7 +131,7 @@ def unit_in_si(name: str) -> str:
 
 
 def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
-    """The head that probably stands for an input, and the heading that it should have."""
+    """Return the head that probably stands for an input, and the heading that it should have."""
     for loosely, candidates in ((False, heads), (True, heads[:_COMPARED])):
         for head in candidates:
             if field := _stands_for(head, name, loosely):
@@ -140,8 +141,8 @@ def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
 
 
 def _stands_for(head: str, name: str, loosely: bool) -> str | None:
-    """The input as which a head probably stands for a column that is missing: omega also as f, and
-    mu_macro as what people call friction.
+    """Return the input as which a head probably stands for a column that is missing: omega also as
+    f, and mu_macro as what people call friction.
 
     >>> _stands_for("freq", "omega", False), _stands_for("COF", "mu_macro", False)
     ('f', 'mu_macro')
@@ -162,7 +163,7 @@ _PEAK_TO_PEAK = re.compile(
 
 
 def _is_whole(head: str, field: str) -> bool:
-    """Whether a head says that its column is twice the amplitude.
+    """Return whether a head says that its column is twice the amplitude.
 
     >>> _is_whole("Amplitude p-p [um]", "y0"), _is_whole("peak amplitude [um]", "y0")
     (True, False)
@@ -171,7 +172,7 @@ def _is_whole(head: str, field: str) -> bool:
 
 
 def _unit_of(head: str, field: str) -> str | None:
-    """The unit that a head has in brackets, or as its last words.
+    """Return the unit that a head has in brackets, or as its last words.
 
     >>> _unit_of("Amplitude [um]", "y0"), _unit_of("Amplitude µm", "y0"), _unit_of("speed", "v0")
     ('um', 'µm', None)

@@ -93,8 +93,8 @@ KINDS = (*_KINDS.values(),)
 
 
 def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
-    """The codes of a contact and a direction; InputError for unknown names and a ball whose normal
-    force oscillates.
+    """Return the codes of a contact and a direction; InputError for unknown names and a ball whose
+    normal force oscillates.
 
     >>> kind_of("ball", "along")
     Kind(contact=1, direction=1)

@@ -212,7 +212,7 @@ def find_layout(
 
 
 def is_known(heads: Sequence[str], column_names: ColumnNames) -> bool:
-    """Whether heads name all that is needed."""
+    """Return whether heads name all that is needed."""
     names = {split_unit(head)[0] for head in heads}
     return all(names.intersection(group) for group in column_names.required_groups)
 
@@ -244,8 +244,8 @@ def _declared(lines: Sequence[str]) -> _Declared:
 def _find_head(
     lines: list[str], column_names: ColumnNames, dialect: Dialect, sep: str | None, labview: bool
 ) -> _Head:
-    """The first line that names all that is needed and fits the row behind it; where the rows are
-    said, the last one before them."""
+    """Return the first line that names all that is needed and fits the row behind it; where the
+    rows are said, the last one before them."""
     seps = (sep,) if sep else tuple(SEPARATORS.values())
     candidates = [*islice(_heads_in(lines, dialect.skip, seps, column_names), 20)]
     if dialect.rows:
@@ -282,7 +282,7 @@ def _refuse_rows_between(before: _Head, head: _Head, lines: list[str], dialect: 
 def _heads_in(
     lines: Sequence[str], skip: int, seps: Sequence[str], column_names: ColumnNames
 ) -> Iterator[_Head]:
-    """The lines that name all that is needed."""
+    """Yield the lines that name all that is needed."""
     for i in range(skip, min(len(lines), LOOKED_AT)):
         names_all = all(
             any(name in lines[i] for name in names) for names in column_names.required_groups
@@ -303,7 +303,8 @@ def _heads_in(
 
 
 def _whole(lines: Sequence[str], i: int) -> tuple[str, int]:
-    """A line with those behind it in which its quoted cells end, and the index behind them."""
+    """Return a line with those behind it in which its quoted cells end, and the index behind
+    them."""
     text = lines[i]
     for end in range(i + 1, min(i + 20, len(lines))):
         if text.count('"') % 2 == 0:
@@ -313,18 +314,18 @@ def _whole(lines: Sequence[str], i: int) -> tuple[str, int]:
 
 
 def is_comment(line: str) -> bool:
-    """Whether a line begins as comments do."""
+    """Return whether a line begins as comments do."""
     return line.lstrip("\ufeff \t").startswith(COMMENT)
 
 
 def uncommented(line: str) -> str:
-    """A line without the sign that makes it a comment: the head of a table may be in one."""
+    """Return a line without the sign that makes it a comment: the head of a table may be in one."""
     text = line.lstrip("\ufeff ")
     return text.lstrip("#%/!").lstrip() if text.startswith(COMMENT) else text
 
 
 def split(line: str, sep: str) -> list[str]:
-    """The cells of a head or of a row of units, without the blanks around them."""
+    """Return the cells of a head or of a row of units, without the blanks around them."""
     if sep != BLANKS and line.count(sep) > MOST_COLUMNS:
         return []
     if sep == BLANKS:
@@ -345,7 +346,7 @@ def split(line: str, sep: str) -> list[str]:
 
 
 def _fits(head: _Head, lines: Sequence[str], labview: bool) -> bool:
-    """Whether the row behind a head has as many cells."""
+    """Return whether the row behind a head has as many cells."""
     width = len(head.cells)
     for i in range(head.end, len(lines)):
         if lines[i].strip() and not is_comment(lines[i]):
@@ -355,8 +356,8 @@ def _fits(head: _Head, lines: Sequence[str], labview: bool) -> bool:
 
 
 def _likely_head(lines: Sequence[str], skip: int, seps: Sequence[str]) -> _Head:
-    """The line that is probably meant for a head: one whose names are like those of inputs, or the
-    one above the first numbers."""
+    """Return the line that is probably meant for a head: one whose names are like those of inputs,
+    or the one above the first numbers."""
     best, most = None, 0.0
     for i in range(skip, min(len(lines), LOOKED_AT)):
         for sep in seps:
@@ -379,7 +380,7 @@ def _likely_head(lines: Sequence[str], skip: int, seps: Sequence[str]) -> _Head:
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell begins as numbers do."""
+    """Return whether a cell begins as numbers do."""
     return cell.lstrip("+-−., ")[:1].isdigit()
 
 
@@ -399,7 +400,7 @@ class _Units:
         self.lines: set[int] = set()  #: indices of the lines that have units
 
     def heads(self) -> list[str]:
-        """The heads with their units."""
+        """Return the heads with their units."""
         return [
             head
             if split_unit(head)[1] is not None or i not in self._units or self._units[i][0] == ""
@@ -487,19 +488,21 @@ def _find_units(found: _Units, lines: list[str], head: _Head, dialect: Dialect) 
 
 
 def _is_whole_row(text: str, head: _Head, found: _Units) -> bool:
-    """Whether a line that begins like a comment is a row, whose first cell is a name such as #1."""
+    """Return whether a line that begins like a comment is a row, whose first cell is a name such as
+    #1."""
     names_first = found.names[0] not in found.like
     return names_first and may_be_row(text, head.sep, len(head.cells))
 
 
 def may_be_row(text: str, sep: str, width: int) -> bool:
-    """Whether a line that begins like a comment has as many cells as the head, with a number."""
+    """Return whether a line that begins like a comment has as many cells as the head, with a
+    number."""
     cells = text.split() if sep == BLANKS else text.split(sep)
     return len(cells) == width > 1 and any(map(is_number, cells[1:]))
 
 
 def is_unit(text: str) -> bool:
-    """Whether a text is a unit of anything.
+    """Return whether a text is a unit of anything.
 
     >>> [is_unit(text) for text in ("mm/s", "-", "°C", "speed")]
     [True, True, True, False]
@@ -512,7 +515,8 @@ def is_unit(text: str) -> bool:
 def units_in(
     line: str, sep: str, names: Sequence[str], like: Mapping[str, str], number: int
 ) -> list[str] | None:
-    """The cells of a line that has nothing but units, which may be a comment; None for another one.
+    """Return the cells of a line that has nothing but units, which may be a comment; None for
+    another one.
 
     TextError where they are units and those of other columns.
     """
@@ -551,15 +555,15 @@ def units_in(
 
 
 def _is_value(text: str) -> bool:
-    """Whether a cell is a number, other than the unit 1."""
+    """Return whether a cell is a number, other than the unit 1."""
     return text != "1" and is_number(text)
 
 
 def is_row_of_units(
     cells: Sequence[str], names: Sequence[str], like: Mapping[str, str], number: int
 ) -> bool:
-    """Whether the first row behind a head has units; a row without any number is taken for one, and
-    TextError tells what is none."""
+    """Return whether the first row behind a head has units; a row without any number is taken for
+    one, and TextError tells what is none."""
     texts = [cell.strip(" []()") for cell in cells]
     places = [i for i, name in enumerate(names[: len(cells)]) if name in like and texts[i]]
     scales = {i: scale_of(like[names[i]], texts[i]) for i in places}
@@ -592,7 +596,7 @@ def _take_legend(found: _Units, line: str, index: int) -> None:
 
 
 def legend(line: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """The names of columns and their units in a line such as ``# v0: speed [mm/s]``.
+    """Yield the names of columns and their units in a line such as ``# v0: speed [mm/s]``.
 
     >>> [*legend("# v0: sliding speed [mm/s], mu_macro in %", ["v0", "mu_macro"])]
     [('v0', 'mm/s'), ('mu_macro', '%')]
@@ -628,7 +632,7 @@ def _places_of_names(line: str, names: Sequence[str]) -> Iterator[tuple[int, str
 
 
 def _unit_in_legend(behind: str) -> str | None:
-    """The unit in what stands behind a name; None where there is none."""
+    """Return the unit in what stands behind a name; None where there is none."""
     match = _BRACKET.match(behind)
     if match is None:
         if _A_NUMBER.search(behind):  # a value, or a range of values

@@ -71,7 +71,7 @@ _FORMER = {
 
 
 def suggestion(name: str, *, loosely: bool = True) -> str | None:
-    """The input that ``name`` probably stands for, in another case, by another name or
+    """Return the input that ``name`` probably stands for, in another case, by another name or
     (``loosely``) misspelt; else None.
 
     >>> [suggestion(name) for name in ("FZ", "F", "stiffness", "omga", "temperature")]
@@ -104,7 +104,7 @@ def in_place_of(name: str, allowed: Iterable[str]) -> str | None:
 
 
 def unknown_name(name: str, allowed: Iterable[str]) -> str:
-    """Why an unknown name is refused, with the most similar one of those allowed.
+    """Return why an unknown name is refused, with the most similar one of those allowed.
 
     >>> unknown_name("omga", ("omega", "f"))
     'unknown field; did you mean omega? allowed: omega, f'

@@ -26,7 +26,7 @@ TOO_LARGE = "is too large, above 1.8e308"
 
 
 def plain(value: float, digits: int) -> str:
-    """A number in a sentence, without a power of ten where that has up to twelve digits.
+    """Return a number in a sentence, without a power of ten where that has up to twelve digits.
 
     >>> plain(20618.6, 3), plain(251.3, 2), plain(0.00103, 3), plain(2e15, 3)
     ('20600', '250', '0.00103', '2e+15')
@@ -35,7 +35,7 @@ def plain(value: float, digits: int) -> str:
 
 
 def tidy(text: str) -> str:
-    """A text with one sign for each meaning, and single blanks.
+    """Return a text with one sign for each meaning, and single blanks.
 
     Signs of full width, such as ２ and ㎛, are those that they stand for; marks that are not seen
     are left out.
@@ -59,8 +59,8 @@ def tidy(text: str) -> str:
 
 @functools.cache
 def _plain(sign: str) -> str:
-    """A sign as what it stands for, nothing for a mark that is not seen; a fraction such as ½ and
-    an index stay, which are no digits."""
+    """Return a sign as what it stands for, nothing for a mark that is not seen; a fraction such as
+    ½ and an index stay, which are no digits."""
     if sign in _SUPERSCRIPTS:
         return _SUPERSCRIPTS[sign]
     if unicodedata.category(sign) == "Cf":
@@ -71,12 +71,14 @@ def _plain(sign: str) -> str:
 
 
 def is_number(text: str) -> bool:
-    """Whether a text is a number as a program writes it, such as ``-1.5e3``, ``nan`` or ``inf``."""
+    """Return whether a text is a number as a program writes it, such as ``-1.5e3``, ``nan`` or
+    ``inf``."""
     return bool(_PLAIN.fullmatch(text) or _WORDS.fullmatch(text))
 
 
 def read_number(text: str, decimal: str = "") -> float:
-    """The number in a text; ValueError with the reason where it is none, or may be one of two.
+    """Return the number in a text; ValueError with the reason where it is none, or may be one of
+    two.
 
     ``decimal`` is the decimal sign where it is known; else it is the point, and a comma that
     cannot be a thousands sign.
@@ -106,7 +108,8 @@ def read_number(text: str, decimal: str = "") -> float:
 
 
 def _double(text: str) -> float:
-    """The double of a plain number; too many digits must not pass for an infinite stiffness."""
+    """Return the double of a plain number; too many digits must not pass for an infinite
+    stiffness."""
     try:
         if not text.isascii():  # float reads digits of every script
             raise ValueError
@@ -119,7 +122,7 @@ def _double(text: str) -> float:
 
 
 def _with_point(text: str, decimal: str) -> str:
-    """A number with a decimal point and no other sign between its digits."""
+    """Return a number with a decimal point and no other sign between its digits."""
     sign, body = (text[0], text[1:]) if text[:1] in "+-" and text else ("", text)
     digits, exponent = body, ""
     for mark in "eEdD":
@@ -163,14 +166,14 @@ def _with_point(text: str, decimal: str) -> str:
 
 
 def _split(digits: str, decimal: str) -> tuple[str, str, str]:
-    """The digits before and behind the decimal sign."""
+    """Return the digits before and behind the decimal sign."""
     if decimal:
         return digits.partition(decimal)
     return digits.partition(max(".,", key=digits.rfind))
 
 
 def split_number(text: str) -> tuple[float, str]:
-    """The number at the start of a tidy text, and what follows it; ValueError as
+    """Return the number at the start of a tidy text, and what follows it; ValueError as
     :func:`read_number`, also where the text does not begin with a number.
 
     >>> split_number("1e6N/m"), split_number("2x10^-6 m"), split_number("1 000 N")

@@ -33,7 +33,7 @@ Harmonic = tuple[int, Any, Any]
 
 
 def read_oscillation(name: str, value: Any) -> list[Harmonic]:
-    """The harmonics of x, y [m] or the normal force [N].
+    """Return the harmonics of x, y [m] or the normal force [N].
 
     InputError names the part: ``x``, or ``x, harmonic``, ``x, amplitude``, ``x, phase``.  Of an
     array of amplitudes none may be negative: samples of a motion are not taken for amplitudes.
@@ -52,7 +52,7 @@ def read_oscillation(name: str, value: Any) -> list[Harmonic]:
 
 
 def _parts(name: str, value: Any) -> list[tuple[Any, Any, Any]]:
-    """Harmonic, amplitude and phase of each part, as they came."""
+    """Return harmonic, amplitude and phase of each part, as they came."""
     if isinstance(value, str):
         return _of_text(name, value)
     if isinstance(value, Mapping):
@@ -74,12 +74,12 @@ def _parts(name: str, value: Any) -> list[tuple[Any, Any, Any]]:
 
 
 def _is_term(part: Any) -> bool:
-    """Whether a part of a tuple is a harmonic, and no amplitude or phase."""
+    """Return whether a part of a tuple is a harmonic, and no amplitude or phase."""
     return isinstance(part, Mapping) or (isinstance(part, tuple) and len(part) == 3)
 
 
 def _of_text(name: str, text: str) -> list[tuple[Any, Any, Any]]:
-    """``harmonic:amplitude@phase``, of several harmonics separated by commas.
+    """Return ``harmonic:amplitude@phase``, of several harmonics separated by commas.
 
     A comma without a harmonic behind it is a decimal sign.
     """
@@ -108,7 +108,8 @@ _WORDS = ("phase", "at", "and", "with")
 
 
 def _with_phase(name: str, text: str) -> str | None:
-    """What is meant by an amplitude and a phase that no @ separates; None where there is none.
+    """Return what is meant by an amplitude and a phase that no @ separates; None where there is
+    none.
 
     >>> _with_phase("x", "0.5 um, phase 90 deg"), _with_phase("x", "0.5 um")
     ('0.5um@90deg', None)
@@ -176,5 +177,5 @@ def _phase(name: str, value: Any) -> Any:
 
 
 def _plain(name: str, value: Any, quantity: str) -> Any:
-    """Numbers in SI without a deviation."""
+    """Return numbers in SI without a deviation."""
     return to_si(name, value, quantity)

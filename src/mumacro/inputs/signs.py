@@ -28,7 +28,8 @@ class Cell(NamedTuple):
 
 
 def evidence(cell: str) -> tuple[Decimal, bool]:
-    """The decimal sign that a number shows, and whether that is sure; "" where it shows none.
+    """Return the decimal sign that a number shows, and whether that is sure; "" where it shows
+    none.
 
     >>> evidence("0,3"), evidence("1.000"), evidence("1.000.000"), evidence("7")
     ((',', True), ('.', False), (',', True), ('', False))
@@ -117,7 +118,7 @@ class Signs:
         )
 
     def check(self, text: str) -> None:
-        """ValueError where a cell has a sign that is neither the given thousands sign nor the
+        """Raise ValueError where a cell has a sign that is neither the given thousands sign nor the
         decimal sign."""
         if self.thousands is None:
             return
@@ -129,8 +130,8 @@ class Signs:
                 )
 
     def with_points(self, text: str) -> str:
-        """A text whose numbers have decimal points and no other signs; ValueError where a sign is
-        neither the decimal one nor between thousands."""
+        """Return a text whose numbers have decimal points and no other signs; ValueError where a
+        sign is neither the decimal one nor between thousands."""
         if not self.decimal:
             return text
         return "..".join(_NUMBER.sub(self._with_point, part) for part in text.split(".."))

@@ -160,7 +160,7 @@ class Rows(NamedTuple):
 
 
 def _cells_of(text: str, sep: str) -> list[str]:
-    """The cells of a row."""
+    """Return the cells of a row."""
     if '"' not in text:
         return text.split(sep)
     return next(csv.reader(io.StringIO(text, newline="\n"), delimiter=sep), [])
@@ -217,8 +217,8 @@ class Account:
         return sep * (width - 1), irregular(len(cells), width)
 
     def _may_be_data(self, line: int, text: str) -> bool:
-        """Whether a line is neither empty nor a comment; a name such as #1 in the first column
-        makes no comment of a row that is whole."""
+        """Return whether a line is neither empty nor a comment; a name such as #1 in the first
+        column makes no comment of a row that is whole."""
         layout = self.layout
         if not text.strip(f" \t{layout.sep}"):
             return False
@@ -236,7 +236,8 @@ class Account:
         return False
 
     def _may_be_head(self, text: str) -> bool:
-        """Whether a text has all names that a head needs, or begins another segment of LabVIEW."""
+        """Return whether a text has all names that a head needs, or begins another segment of
+        LabVIEW."""
         if self.layout.labview and END_OF_HEADER in text:
             return True
         if self.name not in text:
@@ -245,7 +246,7 @@ class Account:
         return all(any(name in text for name in names) for names in groups)
 
     def _is_row(self, line: int, text: str, cells: list[str]) -> bool:
-        """Whether a line of cells is a row; False for the head or its units again."""
+        """Return whether a line of cells is a row; False for the head or its units again."""
         first = next((cell for cell in cells if cell.strip()), "").strip()
         if self._may_be_head(text) and self._repeats_head(line, text):
             self.repeated.append(line)
@@ -273,7 +274,7 @@ class Account:
         return True
 
     def _repeats_head(self, line: int, text: str) -> bool:
-        """Whether a line is the head again; TextError where it is another one."""
+        """Return whether a line is the head again; TextError where it is another one."""
         layout, like = self.layout, self._column_names.like
         if text.startswith(END_OF_HEADER):
             raise TextError(f"line {line} begins another segment: {layout.without(line)}")
@@ -298,7 +299,8 @@ class Account:
         )
 
     def _has_units(self, line: int, text: str) -> bool:
-        """Whether a line has the units of the columns again; TextError where they are others."""
+        """Return whether a line has the units of the columns again; TextError where they are
+        others."""
         layout, like = self.layout, self._column_names.like
         cells = units_in(text, layout.sep, self._names, like, line)
         if cells is None:
@@ -369,8 +371,8 @@ def rows_in(first: int, text: str, account: Account) -> tuple[Rows, str]:
 
 
 def _without_quotes(first: int, data: bytes, sep: str) -> tuple[bytes, bytes, str]:
-    """Rows, the same with zeros in place of quoted cells, and the beginning of a row whose quote is
-    not closed; TextError where a quote is not at the end of its cell."""
+    """Return rows, the same with zeros in place of quoted cells, and the beginning of a row whose
+    quote is not closed; TextError where a quote is not at the end of its cell."""
     if b'"' not in data:
         return data, data, ""
     if b' "' in data:
@@ -393,8 +395,8 @@ def _unclosed(line: int) -> TextError:
 def _doubtful(
     account: Account, data: bytes, bare: bytes, starts: Places, ends: Places
 ) -> list[int]:
-    """The rows that are looked at one by one: those that do not begin as numbers do, have not as
-    many cells as the head, or may be the head again."""
+    """Return the rows that are looked at one by one: those that do not begin as numbers do, have
+    not as many cells as the head, or may be the head again."""
     if not ends.size:
         return []
     signs = np.frombuffer(data, np.uint8)
@@ -419,13 +421,13 @@ def _doubtful(
 
 
 def irregular(count: int, width: int) -> str:
-    """What is wrong with a row of so many cells."""
+    """Return what is wrong with a row of so many cells."""
     cells = "cell" if count == 1 else "cells"
     return f"has {count:,} {cells}, the head has {width:,}"
 
 
 def _begin_of(cells: Places, signs: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    """The first two bytes of the cells that begin at places, behind a quote."""
+    """Return the first two bytes of the cells that begin at places, behind a quote."""
     last = signs.size - 1
     first = cells + (signs[cells] == _QUOTE)
     second = np.minimum(first + 1, last)
@@ -470,7 +472,7 @@ def read_cell(like: str, cell: str, signs: Signs, scale: Scale = SI_UNIT) -> flo
 
 
 def _no_number(like: str, text: str, fault: str, signs: Signs) -> str:
-    """Why a cell has no number."""
+    """Return why a cell has no number."""
     if text.startswith("="):
         return "is a formula without a value: open it in its program, and save it"
     if ".." in text or "±" in text:
@@ -602,15 +604,15 @@ class TextTable:
             )
 
     def _text(self, report_place: Callable[[int], None] = lambda _at: None) -> Text:
-        """The text from its beginning."""
+        """Return the text from its beginning."""
         source = self._source
         pieces = [source] if isinstance(source, bytes) else file_pieces(source, report_place)
         return Text(pieces, self._dialect.encoding)
 
 
 def _between(piece: Piece, first: int, last: int | None) -> tuple[int, str | None]:
-    """The lines of a piece from ``first`` to ``last``, and the number of the first of them; None
-    where there are none."""
+    """Return the lines of a piece from ``first`` to ``last``, and the number of the first of them;
+    None where there are none."""
     start, text = piece
     if start < first:
         lines = text.split("\n", first - start)
@@ -625,8 +627,8 @@ def _between(piece: Piece, first: int, last: int | None) -> tuple[int, str | Non
 def _sheet_in(
     source: Path | bytes, column_names: ColumnNames, dialect: Dialect
 ) -> tuple[Path | bytes, Dialect, str]:
-    """A table as text: of a workbook the sheet that has the names, how it is written, and what is
-    to be said of the sheets."""
+    """Return a table as text: of a workbook the sheet that has the names, how it is written, and
+    what is to be said of the sheets."""
     if isinstance(source, bytes):
         start = source[:4]
     else:

@@ -19,11 +19,11 @@ class Scale(NamedTuple):
     over: float = 1.0
 
     def si(self, value: float) -> float:
-        """``value`` in the SI unit."""
+        """Return ``value`` in the SI unit."""
         return value * self.times / self.over
 
     def of_si(self, value: float) -> float:
-        """``value``, which is in SI, in this unit."""
+        """Return ``value``, which is in SI, in this unit."""
         return value * self.over / self.times
 
 
@@ -94,7 +94,7 @@ _FREQUENCY = {
 
 
 def _over(upper: Mapping[str, Scale], lower: Mapping[str, Scale]) -> dict[str, Scale]:
-    """Every unit of ``upper`` over every unit of ``lower``."""
+    """Return every unit of ``upper`` over every unit of ``lower``."""
     return {
         f"{one}/{other}": Scale(up.times * down.over, up.over * down.times)
         for one, up in upper.items()
@@ -201,8 +201,8 @@ _SHOWN: dict[str, dict[str, Scale]] = {
 
 
 def suited(unit: str, value: float) -> tuple[str, Scale]:
-    """The unit in which a value in an SI ``unit`` is a number that people like to read, and its
-    scale: the largest of the usual ones in which it is at least 0.1; the SI unit for 0.
+    """Return the unit in which a value in an SI ``unit`` is a number that people like to read, and
+    its scale: the largest of the usual ones in which it is at least 0.1; the SI unit for 0.
 
     >>> suited("m", 2.455e-6)[0], suited("N/m", 13.07e6)[0], suited("-", 0.3)[0]
     ('um', 'N/um', '-')
@@ -298,7 +298,7 @@ LONGEST = 80  # characters of a unit
 
 @functools.lru_cache(1024)
 def canonical(unit: str) -> str:
-    """A unit as the table writes it.
+    """Return a unit as the table writes it.
 
     >>> [canonical(unit) for unit in ("mm s^-1", "mm/sec", "N·mm⁻¹", "newton / micrometer", "[N]")]
     ['mm/s', 'mm/s', 'N/mm', 'N/um', 'N']
@@ -345,7 +345,7 @@ _WORDS = {"per", "to", "rms", "pp", "p-p", "pk-pk", "ptp", "peak", "peak-to-peak
 
 
 def belongs_to_value(word: str) -> bool:
-    """Whether a word behind a value is a part of it, such as a unit that stands apart.
+    """Return whether a word behind a value is a part of it, such as a unit that stands apart.
 
     >>> [belongs_to_value(word) for word in ("um", "±", "1.2", "/", "newtons", "fast")]
     [True, True, True, True, True, False]
@@ -383,7 +383,8 @@ def split_unit(column: str) -> tuple[str, str | None]:
 
 
 def scale_of(name: str, unit: str) -> Scale | None:
-    """The scale of a ``unit`` of a value by its name; None for a unit that is not in the table.
+    """Return the scale of a ``unit`` of a value by its name; None for a unit that is not in the
+    table.
 
     >>> scale_of("k", "N/mm").si(3.0)
     3000.0
@@ -392,7 +393,7 @@ def scale_of(name: str, unit: str) -> Scale | None:
 
 
 def scale_in(quantity: str, unit: str) -> Scale | None:
-    """The scale of a ``unit`` of a quantity; None for a unit that is not in the table."""
+    """Return the scale of a ``unit`` of a quantity; None for a unit that is not in the table."""
     units = QUANTITIES[quantity].units
     scale = units.get(unit)
     if scale is not None or len(unit) > LONGEST:
@@ -439,14 +440,14 @@ _INPUT = {"frequency": "f", "angular frequency": "omega", "speed": "v0", "length
 
 
 def is_level(unit: str) -> bool:
-    """Whether a unit is one of levels, such as dB, whose reference is not said."""
+    """Return whether a unit is one of levels, such as dB, whose reference is not said."""
     words = re.split(r"[^a-z]+", unit[:LONGEST].lower())
     return any(word.rstrip("s") in _LEVELS or word.startswith("db") for word in words)
 
 
 def bound_of_unit(quantity: str, number: float, unit: str) -> str:
-    """What a value must be whose ``unit`` its quantity cannot have: as in "y0 must be ...", with
-    the number to give where it is clear what is meant.
+    """Return what a value must be whose ``unit`` its quantity cannot have: as in "y0 must be ...",
+    with the number to give where it is clear what is meant.
 
     >>> bound_of_unit("length", 4.0, "umpp"), bound_of_unit("force", 100.0, "g")
     ('half of peak to peak: give 2um', 'a force: the weight of 100 g is 0.980665 N, give 0.980665N')

@@ -79,7 +79,7 @@ def _chosen(
     decimal: str | None,
     has_names: Callable[[list[str]], bool],
 ) -> Any:
-    """The sheet of a name, or the one that has the names of the columns."""
+    """Return the sheet of a name, or the one that has the names of the columns."""
     titles = ", ".join(repr(one.title) for one in sheets[:10])
     if sheet is not None:
         named = next((one for one in sheets if one.title == sheet), None)
@@ -108,7 +108,7 @@ def _chosen(
 
 
 def _as_text(sheet: Any, formulas: Any, decimal: str | None) -> str:
-    """The rows of a sheet as lines; a formula without a value is its text."""
+    """Return the rows of a sheet as lines; a formula without a value is its text."""
     sheet.reset_dimensions()
     if formulas is not None:
         formulas.reset_dimensions()
@@ -127,7 +127,7 @@ def _as_text(sheet: Any, formulas: Any, decimal: str | None) -> str:
 
 
 def _has_formulas(stream: BinaryIO) -> bool:
-    """Whether a sheet has a formula."""
+    """Return whether a sheet has a formula."""
     with zipfile.ZipFile(stream) as parts:
         for name in parts.namelist():
             if not name.lower().lstrip("/").startswith("xl/worksheets/"):
@@ -177,8 +177,8 @@ def _refuse_no_workbook(stream: BinaryIO) -> None:
 
 
 def _text(cell: Any, decimal: str | None) -> str:
-    """A cell as it would be typed: with the decimal sign that is given, and with the unit that its
-    number format shows."""
+    """Return a cell as it would be typed: with the decimal sign that is given, and with the unit
+    that its number format shows."""
     value = cell.value
     if value is None:
         return ""
@@ -198,5 +198,5 @@ def _text(cell: Any, decimal: str | None) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A text as a cell."""
+    """Return a text as a cell."""
     return '"' + text.replace('"', '""') + '"' if '"' in text else text

@@ -12,7 +12,7 @@ Places = NDArray[np.intp]
 
 
 def common_shape(arrays: Iterable[Array]) -> tuple[int, ...]:
-    """The shape to which arrays broadcast; ValueError where they do not."""
+    """Return the shape to which arrays broadcast; ValueError where they do not."""
     shapes = {array.shape for array in arrays}
     shapes.discard(())
     if len(shapes) > 1:
@@ -21,7 +21,7 @@ def common_shape(arrays: Iterable[Array]) -> tuple[int, ...]:
 
 
 def flat(array: Array, shape: tuple[int, ...]) -> Array:
-    """``array`` broadcast to ``shape``, as flat, contiguous and aligned."""
+    """Return ``array`` broadcast to ``shape``, as flat, contiguous and aligned."""
     if array.shape != shape:
         array = np.broadcast_to(array, shape)
     if not array.flags.carray:

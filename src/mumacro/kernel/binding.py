@@ -26,7 +26,7 @@ _SHARED_OBJECT = _HERE / ("_kernel.dll" if sys.platform == "win32" else "_kernel
 
 
 def _opened() -> tuple[Any, Any]:
-    """cffi with the declarations, and the shared object."""
+    """Return cffi with the declarations, and the shared object."""
     try:
         from mumacro.kernel._declarations import ffi
 
@@ -66,7 +66,7 @@ def _numbers(array: Array | None) -> Any:
 
 
 def _harmonics(orders: Sequence[Sequence[int]]) -> tuple[Any, Any]:
-    """How many harmonics x, y and the normal force have, and all of them."""
+    """Return how many harmonics x, y and the normal force have, and all of them."""
     all_orders = [float(order) for part in orders for order in part]
     return _FFI.new("int32_t[3]", [len(part) for part in orders]), _FFI.new(
         "double[]", all_orders or [0.0]
@@ -74,14 +74,15 @@ def _harmonics(orders: Sequence[Sequence[int]]) -> tuple[Any, Any]:
 
 
 def _out(rows: Sequence[Array], start: int) -> tuple[Any, int]:
-    """Where the kernel writes rows of one array from column ``start`` on, and their stride."""
+    """Return where the kernel writes rows of one array from column ``start`` on, and their
+    stride."""
     whole = np.asarray(rows[0].base)
     return _numbers(whole) + start, whole.shape[1]
 
 
 def _columns_of(columns: Sequence[Array | float], start: int) -> Any:
-    """Six columns, (n,) or one number, from ``start`` on as a ``mumacro_columns``, which is valid
-    as long as they are."""
+    """Return six columns, (n,) or one number, from ``start`` on as a ``mumacro_columns``, which is
+    valid as long as they are."""
     of_kernel = _new(_COLUMNS)
     arrays, constants = of_kernel.array, of_kernel.constant
     for i, column in enumerate(columns):
@@ -94,7 +95,7 @@ def _columns_of(columns: Sequence[Array | float], start: int) -> Any:
 
 
 def _record(enum: str, prefix: str, end: str) -> np.dtype[np.void]:
-    """A row of doubles with the names of an enum, in which ``end`` counts all columns."""
+    """Return a row of doubles with the names of an enum, in which ``end`` counts all columns."""
     places = dict(_FFI.typeof(f"enum {enum}").relements)
     columns = places.pop(end)
     return np.dtype(
@@ -166,7 +167,7 @@ class CaseRows:
 
     @classmethod
     def empty(cls, shape: tuple[int, ...], detail: Detail = "values") -> Self:
-        """Room for the answers to cases of a shape."""
+        """Return room for the answers to cases of a shape."""
         return cls(np.empty((_END[detail], *shape)), np.empty(shape, np.int8))
 
 
@@ -182,7 +183,7 @@ class SlopeRows(NamedTuple):
 
     @classmethod
     def empty(cls, n: int) -> Self:
-        """Room for n points."""
+        """Return room for n points."""
         return cls(*np.empty((_SLOPE_ROWS, n)))
 
 
@@ -196,7 +197,7 @@ class ExtremeRows(NamedTuple):
 
     @classmethod
     def empty(cls, n: int) -> Self:
-        """Room for n intervals."""
+        """Return room for n intervals."""
         return cls(*np.empty((_EXTREME_ROWS, n)))
 
 
@@ -243,7 +244,7 @@ class Data:
         self.pointer.driven.nodes = points.shape[0]
 
     def _keep(self, place: Any, name: str, array: Array) -> Array:
-        """Point ``place.name`` to the numbers, which live as long as this object."""
+        """Return point ``place.name`` to the numbers, which live as long as this object."""
         array = np.require(array, np.float64, ["C", "A"])
         pointer = _numbers(array)
         setattr(place, name, pointer)
@@ -266,7 +267,7 @@ class Kernel:
         self._values, self._one, self._cases = functions.values, functions.one, functions.cases
 
     def text(self, pointer: Any) -> str:
-        """A text of the kernel."""
+        """Return a text of the kernel."""
         return str(_FFI.string(pointer).decode())
 
     def chart(self, contact: int, place: int) -> Any:
@@ -292,8 +293,8 @@ class Kernel:
         source: Codes | None,
         kind: tuple[int, int] = (0, 0),
     ) -> None:
-        """A quantity at points (n,): fill ``value``, its ``bound`` and the ``source``, where
-        wanted.
+        """Evaluate a quantity at points (n,): fill ``value``, its ``bound`` and the ``source``,
+        where wanted.
 
         Of another ``kind``, see :meth:`cases`, all three are.
         """
@@ -304,7 +305,7 @@ class Kernel:
     def value(
         self, data: Data, quantity: int, v: float, y: float, contact: int = 0
     ) -> tuple[float, float, int]:
-        """A quantity at one point in plain numbers, its bound and the source."""
+        """Return a quantity at one point in plain numbers, its bound and the source."""
         point, code = _new(_POINT, (v, y)), _new(_CODE)
         at = point, point + 1, point + 2, point + 3
         self._values(data.pointer, contact, 0, quantity, 1, *at, code)
@@ -320,7 +321,7 @@ class Kernel:
         start: int = 0,
         contact: int = 0,
     ) -> None:
-        """A quantity and its slopes at points (n,): fill ``rows`` from ``start`` on."""
+        """Evaluate a quantity and its slopes at points (n,): fill ``rows`` from ``start`` on."""
         points = _numbers(v), _numbers(y)
         self._functions.slopes(data.pointer, contact, quantity, v.size, *points, *_out(rows, start))
 
@@ -332,7 +333,7 @@ class Kernel:
         part: slice,
         kind: tuple[int, int] = (0, 0),
     ) -> None:
-        """A part of n cases: fill ``answers`` there.
+        """Evaluate a part of n cases: fill ``answers`` there.
 
         ``columns`` are the six inputs, (n,) or one number.  ``kind``: another contact and
         direction, see :class:`mumacro.inputs.kind.Kind`.
@@ -352,20 +353,22 @@ class Kernel:
         part: slice,
         kind: tuple[int, int] = (0, 0),
     ) -> None:
-        """As :meth:`cases`, with k from its column to ``high`` (n,)."""
+        """Evaluate as :meth:`cases`, with k from its column to ``high`` (n,)."""
         start, n = part.start, part.stop - part.start
         six, ends = _columns_of(columns, start), _numbers(high) + start
         self._functions.intervals(data.pointer, *kind, n, six, ends, *_out(rows, start))
 
     def one(self, pointer: Any, six: Sequence[float], with_gradient: bool, contact: int = 0) -> Any:
-        """One case in plain numbers: a ``mumacro_case``, its gradient only where asked for."""
+        """Return one case in plain numbers: a ``mumacro_case``, its gradient only where asked
+        for."""
         # named: a call with *six takes longer
         answer, (mu0, Fz, k, y0, omega, v0) = _new(_CASE), six
         self._one(pointer, contact, mu0, Fz, k, y0, omega, v0, with_gradient, answer)
         return answer
 
     def border(self, data: Data, y: Array, kind: tuple[int, int] = (0, 0)) -> Array:
-        """v~crit at ``y`` (n,): 0 at 0, infinite at infinity, NaN for what is no amplitude."""
+        """Return v~crit at ``y`` (n,): 0 at 0, infinite at infinity, NaN for what is no
+        amplitude."""
         out = np.empty(y.size)
         self._functions.border_as(data.pointer, *kind, y.size, _numbers(y), _numbers(out))
         return out
@@ -373,8 +376,8 @@ class Kernel:
     def places(
         self, data: Data, v: Array, y: Array, contact: int = 0
     ) -> tuple[Codes, Array, Array]:
-        """Blocks of points (n,) with 0 < v~, y~ < infinity, of a ball those of its middle spring,
-        and their coordinates as evaluation counts them."""
+        """Return blocks of points (n,) with 0 < v~, y~ < infinity, of a ball those of its middle
+        spring, and their coordinates as evaluation counts them."""
         block, a, b = np.empty(v.size, np.int8), np.empty(v.size), np.empty(v.size)
         codes = _from_buffer(_CODES, block)
         arrays = _numbers(v), _numbers(y), codes, _numbers(a), _numbers(b)
@@ -406,9 +409,9 @@ class Kernel:
         stop: Any,
         most: int = MOST_STEPS,
     ) -> None:
-        """Steady cycles of motions: ``out`` (n, 7) filled from ``cases`` (n, 1 + terms), see
-        ``kernel/library.h``; ``orders`` are the harmonics of x, y and the normal force.  A flag
-        ``stop`` that another thread sets ends it."""
+        """Compute steady cycles of motions: ``out`` (n, 7) filled from ``cases`` (n, 1 + terms),
+        see ``kernel/library.h``; ``orders`` are the harmonics of x, y and the normal force. A
+        flag ``stop`` that another thread sets ends it."""
         counts, all_orders = _harmonics(orders)
         self._functions.motions(
             contact,
@@ -434,7 +437,7 @@ class Kernel:
         n: int,
         stop: Any,
     ) -> Array:
-        """Forces (n + 1, 2) of one cycle of a case at equal times, summed over springs."""
+        """Return forces (n + 1, 2) of one cycle of a case at equal times, summed over springs."""
         forces, (counts, all_orders) = np.empty((n + 1, 2)), _harmonics(orders)
         self._functions.motion_cycle(
             counts,
@@ -455,8 +458,8 @@ class Kernel:
     def loop_forces(
         self, contact: int, p: Array, x: Array, Fz: Array, before: int = 0, start: float = 0.0
     ) -> tuple[Array, Array]:
-        """Forces over mu0 at samples of the place ``x`` (n,) under the load ``Fz`` (n,), for each
-        p = k / mu0 (m,), and their slopes along ln p, (m, n) both: see ``kernel/loop.c``."""
+        """Return forces over mu0 at samples of the place ``x`` (n,) under the load ``Fz`` (n,), for
+        each p = k / mu0 (m,), and their slopes along ln p, (m, n) both: see ``kernel/loop.c``."""
         force, slope = np.empty((p.size, x.size)), np.empty((p.size, x.size))
         room = np.empty(3 * (x.size + before))
         ends = map(_numbers, (room, force, slope))
@@ -467,14 +470,14 @@ class Kernel:
     # --- for the builder --------------------------------------------------------------------------
 
     def tabulated(self, data: Data, quantity: int, block: int, a: Array, b: Array) -> Array:
-        """What ``block`` tabulates at its coordinates (n,) as :meth:`places` gives them."""
+        """Return what ``block`` tabulates at its coordinates (n,) as :meth:`places` gives them."""
         q = np.empty(a.size)
         self._functions.tabulated(data.pointer, quantity, block, a.size, *map(_numbers, (a, b, q)))
         return q
 
     def turns_in_stick(self, v: Array, y: Array, stick: Array, bound: Array) -> tuple[Array, Array]:
-        """1 - cos of the angle by which the force of one spring turns in a stick, at points (n,)
-        with their stick fraction and its bound; and what that leaves open."""
+        """Return 1 - cos of the angle by which the force of one spring turns in a stick, at points
+        (n,) with their stick fraction and its bound; and what that leaves open."""
         turn, error = np.empty(v.size), np.empty(v.size)
         arrays = map(_numbers, (v, y, stick, bound, turn, error))
         self._functions.turns_in_stick(v.size, *arrays)
@@ -483,8 +486,8 @@ class Kernel:
     def forms(
         self, quantity: int, block: int, v: Array, y: Array, eta: Array, contact: int = 0
     ) -> tuple[Array, Array]:
-        """(base, factor) with value = base + factor q in ``block``, any shape; eta = y~ - 1 counts
-        in the corner."""
+        """Return (base, factor) with value = base + factor q in ``block``, any shape; eta = y~ - 1
+        counts in the corner."""
         base, factor = np.empty(v.shape), np.empty(v.shape)
         v, y, eta = (np.ascontiguousarray(x, np.float64) for x in (v, y, eta))
         numbers = map(_numbers, (v, y, eta, base, factor))
@@ -492,8 +495,8 @@ class Kernel:
         return base, factor
 
     def border_scales(self, piece: int, y: Array) -> tuple[Array, Array]:
-        """What node values of a piece of the border, and what its cells, are multiplied by to give
-        v~crit, (n,)."""
+        """Return what node values of a piece of the border, and what its cells, are multiplied by
+        to give v~crit, (n,)."""
         of_nodes, of_cells = np.empty(y.size), np.empty(y.size)
         self._functions.border_scales(
             piece, y.size, *map(_numbers, (np.ascontiguousarray(y), of_nodes, of_cells))
@@ -501,8 +504,8 @@ class Kernel:
         return of_nodes, of_cells
 
     def cell_shares(self, w: Array) -> tuple[Array, Array]:
-        """Shares of a cell's largest error that derivatives have at ``w``; in the last cell below
-        the border, (n,)."""
+        """Return shares of a cell's largest error that derivatives have at ``w``; in the last cell
+        below the border, (n,)."""
         inside, at_border = np.empty(w.size), np.empty(w.size)
         self._functions.cell_shares(
             w.size, *map(_numbers, (np.ascontiguousarray(w), inside, at_border))
@@ -510,22 +513,22 @@ class Kernel:
         return inside, at_border
 
     def entries(self, t: Array) -> Array:
-        """y~ at which rays v~/y~ = t times the steepest enter stick-slip, of any shape, 0 < t <=
-        1."""
+        """Return y~ at which rays v~/y~ = t times the steepest enter stick-slip, of any shape, 0 <
+        t <= 1."""
         t = np.ascontiguousarray(t, np.float64)
         out = np.empty(t.shape)
         self._functions.entries(t.size, _numbers(t), _numbers(out))
         return out
 
     def normal_form_root(self, v: Array, eta: Array) -> Array:
-        """Positive root of phi^3 + 2 eta phi = pi v~, (n,)."""
+        """Return positive root of phi^3 + 2 eta phi = pi v~, (n,)."""
         out = np.empty(v.size)
         self._functions.normal_form_root(v.size, *map(_numbers, (v, eta, out)))
         return out
 
     def outer_expansion(self, r: Array) -> Array:
-        """f, g, r f', r g', r (r f')' of mu~ = f(r) + g(r)/v~^2 + ... at r = y~/v~, shape (n,
-        5)."""
+        """Return f, g, r f', r g', r (r f')' of mu~ = f(r) + g(r)/v~^2 + ... at r = y~/v~, shape
+        (n, 5)."""
         out = np.empty((r.size, 5))
         self._functions.outer_expansion(r.size, _numbers(r), _numbers(out))
         return out

@@ -26,15 +26,16 @@ _KERNEL = kernels[-1]
 
 
 def _cost(kind: tuple[int, int]) -> int:
-    """The time of a point of a kind, about, divided by that of a spring that is shaken across."""
+    """Return the time of a point of a kind, about, divided by that of a spring that is shaken
+    across."""
     contact, direction = kind
     return ALONG_COST if direction else 1 + contact
 
 
 @functools.cache
 def processors() -> int:
-    """How many processors this process may use; the limit of a container counts, if the system
-    gives it."""
+    """Return how many processors this process may use; the limit of a container counts, if the
+    system gives it."""
     count = (
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     )
@@ -46,7 +47,7 @@ def processors() -> int:
 
 
 def default_threads() -> int:
-    """The default number of threads of a call.
+    """Return the default number of threads of a call.
 
     All processors in the main thread of a program.  One in any other thread and in a child process:
     what started them (Dask, joblib, multiprocessing, a pool of threads) already divides the work.
@@ -95,7 +96,7 @@ def values(
     threads: int | None,
     kind: tuple[int, int] = (0, 0),
 ) -> tuple[Array, Array, Codes]:
-    """A quantity at (n,) points with its bound and source; NaN and -1 where illegal."""
+    """Return a quantity at (n,) points with its bound and source; NaN and -1 where illegal."""
     value, bound, source = np.empty(v.size), np.empty(v.size), np.empty(v.size, np.int8)
 
     def work(part: slice) -> None:
@@ -110,7 +111,7 @@ def values(
 def values_without_bounds(
     quantity: int, data: Data, v: Array, y: Array, threads: int | None
 ) -> Array:
-    """A quantity of one spring at (n,) points; NaN where illegal."""
+    """Return a quantity of one spring at (n,) points; NaN where illegal."""
     value = np.empty(v.size)
     share_out(
         v.size,
@@ -123,7 +124,7 @@ def values_without_bounds(
 def slopes(
     quantity: int, data: Data, v: Array, y: Array, threads: int | None, contact: int = 0
 ) -> SlopeRows:
-    """Any quantity at (n,) points with its slopes and their bounds."""
+    """Return any quantity at (n,) points with its slopes and their bounds."""
     rows = SlopeRows.empty(v.size)
     share_out(
         v.size,
@@ -141,7 +142,7 @@ def cases(
     detail: Detail,
     kind: tuple[int, int] = (0, 0),
 ) -> CaseRows:
-    """Answers to cases of a shape, see :meth:`mumacro.kernel.binding.Kernel.cases`."""
+    """Return answers to cases of a shape, see :meth:`mumacro.kernel.binding.Kernel.cases`."""
     answers = CaseRows.empty(shape, detail)
     share_out(
         answers.source.size,
@@ -159,7 +160,7 @@ def intervals(
     threads: int | None,
     kind: tuple[int, int] = (0, 0),
 ) -> ExtremeRows:
-    """Extremes of cases whose k reaches from its column to ``high``, see
+    """Return extremes of cases whose k reaches from its column to ``high``, see
     :meth:`mumacro.kernel.binding.Kernel.intervals`."""
     rows = ExtremeRows.empty(high.size)
 

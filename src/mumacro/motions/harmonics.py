@@ -46,7 +46,7 @@ class Harmonics(Result):
         }
 
     def _members(self) -> dict[str, Any]:
-        """Each term is a dict, as HTTP takes it."""
+        """Return each term is a dict, as HTTP takes it."""
         names = ("harmonic", "amplitude", "phase")
         terms = [dict(zip(names, term, strict=True)) for term in self.terms]
         return {
@@ -64,7 +64,7 @@ class Harmonics(Result):
 
 
 def harmonics(samples: Numbers, periods: int = 1, most: int = 20) -> Harmonics:
-    """The harmonics of a sampled oscillation, as :func:`mumacro.motion` takes them.
+    """Return the harmonics of a sampled oscillation, as :func:`mumacro.motion` takes them.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def harmonics(samples: Numbers, periods: int = 1, most: int = 20) -> Harmonics:
 
 
 def _samples(samples: Any) -> Array:
-    """Finite numbers, (n,), n >= 3, in SI."""
+    """Return finite numbers, (n,), n >= 3, in SI."""
     has_unit = carried_unit(samples) is not None
     values = np.asarray(_in_si(samples) if has_unit else to_si("samples", samples))
     if values.ndim != 1 or values.size < 3:
@@ -140,7 +140,7 @@ def _samples(samples: Any) -> Array:
 
 
 def _in_si(samples: Any) -> Any:
-    """Samples that carry a unit, of a length or of a force."""
+    """Return samples that carry a unit, of a length or of a force."""
     try:
         return to_si("samples", samples, "length")
     except InputError:
@@ -148,7 +148,7 @@ def _in_si(samples: Any) -> Any:
 
 
 def _spectrum(scaled: Array, scale: float, periods: int, most: int) -> Harmonics:
-    """The harmonics of samples in units of ``scale`` that repeat nothing."""
+    """Return the harmonics of samples in units of ``scale`` that repeat nothing."""
     mean = float(scaled.mean())
     spectrum = np.fft.rfft(scaled - mean) / scaled.size
     orders = np.arange(1, most + 1)

@@ -54,7 +54,7 @@ class Term(NamedTuple):
     phase: Array  #: [rad]
 
     def at(self, tau: Array, i: int) -> Array:
-        """Values of case i at tau = omega t."""
+        """Return values of case i at tau = omega t."""
         out: Array = self.amplitude[i] * np.sin(self.harmonic * tau + self.phase[i])
         return out
 
@@ -156,7 +156,7 @@ class Motion(Result):
     scenes: Scenes = field(compare=False)
 
     def cycle(self, index: int | None = None, points: int = 400) -> Cycle:
-        """One steady period at ``points`` + 1 equal times.
+        """Return one steady period at ``points`` + 1 equal times.
 
         ``index`` is the place of a case in the flattened arrays, needed where there are many.  A
         ball has 64 springs here; the mean of Fx/Fz may differ from ``mu_macro`` by 1e-3 mu0.
@@ -185,8 +185,8 @@ class Motion(Result):
         return Cycle(tau / omega, v0 * (tau / omega) + x, y, Fx, Fy, Fz + load)
 
     def plot(self, ax: Any = None, *, index: int | None = None) -> Any:
-        """Forces over a period, and beside them the path of the upper point with the force at 16
-        moments; of many cases the one at ``index``, as in :meth:`cycle`.
+        """Return forces over a period, and beside them the path of the upper point with the force
+        at 16 moments; of many cases the one at ``index``, as in :meth:`cycle`.
 
         ``ax`` are two axes of matplotlib, or one, which gets no path, or new ones; those of the
         forces are returned.
@@ -198,7 +198,8 @@ class Motion(Result):
         return plotting.plot_cycle(*self.cycle(index), case["mu0"], title, ax)
 
     def _oscillations(self, i: int) -> list[str]:
-        """The amplitudes and phases of a case in words, a text for each part that oscillates."""
+        """Return the amplitudes and phases of a case in words, a text for each part that
+        oscillates."""
         words = []
         for symbol, part in zip(("$x$", "$y$", "$F_z$"), self.scenes.terms, strict=True):
             unit = "N" if symbol == "$F_z$" else "m"
@@ -238,7 +239,7 @@ class Motion(Result):
         return [*self._gave_up(), *doubts]
 
     def _gave_up(self) -> list[Note]:
-        """A warning where the error is above the tolerance."""
+        """Return a warning where the error is above the tolerance."""
         c, tolerance = self.scenes.columns, self.scenes.tolerance
         error = np.ravel(self.error_estimate)
         left = error > tolerance * c["mu0"] * (1.0 + 1e-9)
@@ -268,7 +269,7 @@ class Motion(Result):
         return None if np.shape(self.mu_macro) else []
 
     def _in_full(self) -> tuple[str, Rows | None, list[str]]:
-        """Of one case a number a row with unit and meaning."""
+        """Return of one case a number a row, with unit and meaning."""
         if np.shape(self.mu_macro):
             return super()._in_full()
         rows: Rows = [
@@ -294,7 +295,7 @@ def motion(
     tolerance: float = 1e-6,
     threads: int | None = None,
 ) -> Motion:
-    """The steady cycle of a contact that is dragged along x and shaken in x, y and normally.
+    """Return the steady cycle of a contact that is dragged along x and shaken in x, y and normally.
 
     Parameters
     ----------
@@ -383,7 +384,7 @@ def motion(
 
 
 def _terms(name: str, part: Any) -> Iterable[Term]:
-    """The harmonics of one part of a motion; none for an amplitude 0."""
+    """Yield the harmonics of one part of a motion; none for an amplitude 0."""
     for order, amplitude, degrees in read_oscillation(name, part):
         size = np.asarray(amplitude, np.float64)
         with np.errstate(invalid="ignore"):
@@ -393,7 +394,7 @@ def _terms(name: str, part: Any) -> Iterable[Term]:
 
 
 def _legal(scenes: Scenes, one: bool) -> Bools:
-    """Which cases have an answer, (n,); InputError for ``one`` that has none."""
+    """Return which cases have an answer, (n,); InputError for ``one`` that has none."""
     c, frequency = scenes.columns, scenes.frequency
     legal = np.ones(c["mu0"].size, dtype=np.bool_)
 
@@ -451,7 +452,7 @@ def _legal(scenes: Scenes, one: bool) -> Bools:
 
 
 def _lowest_load(scenes: Scenes, legal: Bools) -> Array:
-    """A lower bound of the normal force over the period [N], (n,)."""
+    """Return a lower bound of the normal force over the period [N], (n,)."""
     Fz, part = scenes.columns["Fz"], scenes.terms[2]
     low: Array = Fz - sum((term.amplitude for term in part), np.zeros(Fz.size))
     if not part:
@@ -467,7 +468,7 @@ def _lowest_load(scenes: Scenes, legal: Bools) -> Array:
 
 
 def _steady(scenes: Scenes, legal: Bools, threads: int) -> Array:
-    """Rows of the kernel for the legal cases."""
+    """Return rows of the kernel for the legal cases."""
     cases = np.ascontiguousarray(scenes.dimensionless[legal])
     out = np.empty((cases.shape[0], 7))
     ball = scenes.contact == "ball"

@@ -71,8 +71,8 @@ class MotionSolution(Solution):
         return text
 
     def plot(self, ax: Any = None) -> Any:
-        """The mean force over the unknown with the targets and their roots, on axes ``ax`` of
-        matplotlib, or new ones, which are returned."""
+        """Return the mean force over the unknown with the targets and their roots, on axes ``ax``
+        of matplotlib, or new ones, which are returned."""
         x, _ = self.samples
         places = [root.value for roots in self.roots for root in roots]
         even = np.geomspace if _log(x[0], x[-1]) else np.linspace
@@ -94,7 +94,7 @@ class MotionSolution(Solution):
         )
 
     def _motion_words(self) -> str:
-        """The oscillations, without the unknown part."""
+        """Return the oscillations, without the unknown part."""
         words = []
         for part, symbol, unit in (("x", "$x$", "m"), ("y", "$y$", "m"), ("normal", "$F_z$", "N")):
             terms = read_oscillation(part, self.case.get(part, 0.0))
@@ -118,7 +118,7 @@ def solve_motion(
     within: tuple[Any, Any] | None = None,
     **case: Any,
 ) -> MotionSolution:
-    """Every value of one input of a motion at which a mean force is ``target``.
+    """Return every value of one input of a motion at which a mean force is ``target``.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ class Curve:
                 self.case[name] = self.number(name)
 
     def opposite(self) -> "Curve":
-        """The same motion with x turned by half a period: it moves the other way."""
+        """Return the same motion with x turned by half a period: it moves the other way."""
         terms = read_oscillation("x", self.case["x"])
         opposite = [(order, amplitude, phase + 180.0) for order, amplitude, phase in terms]
         return Curve(self.unknown, self.of, {**self.case, "x": opposite})
@@ -266,7 +266,7 @@ class Curve:
         )
 
     def number(self, name: str) -> float:
-        """One given input of the case [SI]."""
+        """Return one given input of the case [SI]."""
         value = self.case.get(name)
         if value is None:
             raise InputError(name, None, f"given [{unit_of(name)}]")
@@ -283,7 +283,8 @@ class Curve:
         return RAD_PER_CYCLE * self.number("f")
 
     def swing(self) -> float:
-        """The largest way of the oscillations in x and y [m], harmonics as often as they turn."""
+        """Return the largest way of the oscillations in x and y [m], harmonics as often as they
+        turn."""
         total = 0.0
         for part in ("x", "y"):
             if part != self._part or not self._member:
@@ -293,7 +294,7 @@ class Curve:
 
 
 def _range(within: Any, unknown: str, curve: Curve) -> tuple[float, float]:
-    """The range to search, ascending."""
+    """Return the range to search, ascending."""
     if within is None:
         return _usual_range(unknown, curve)
     part, _, member = unknown.partition(".")
@@ -313,7 +314,7 @@ def _range(within: Any, unknown: str, curve: Curve) -> tuple[float, float]:
 
 
 def _usual_range(unknown: str, curve: Curve) -> tuple[float, float]:
-    """Where the unknown matters."""
+    """Return where the unknown matters."""
     member = unknown.partition(".")[2]
     if member == "phase":
         return 0.0, 360.0
@@ -351,7 +352,7 @@ def _usual_range(unknown: str, curve: Curve) -> tuple[float, float]:
 
 
 def _log(low: float, high: float) -> bool:
-    """Whether a range is searched, and drawn, in logarithms."""
+    """Return whether a range is searched, and drawn, in logarithms."""
     return low > 0.0 and high / low > _DECADES
 
 

@@ -18,8 +18,8 @@ STRAIGHT = 0.2
 
 
 def std(cases: Evaluated) -> Values:
-    """Whole deviation, its part that comes from the gradient's bound, and the share of each input
-    in the variance."""
+    """Return whole deviation, its part that comes from the gradient's bound, and the share of each
+    input in the variance."""
     spreads = {name: cases.cases.std.get(name, 0.0) for name in cases.kind.fields}
     # k has no effect where contact is rigid, nor has an infinite slope where the input is exact
     exact = {
@@ -38,8 +38,9 @@ def std(cases: Evaluated) -> Values:
 
 
 def bent(cases: Evaluated, total: float) -> list[Note]:
-    """Remarks on one case: the inputs along which first order is not enough, since mu_macro one
-    deviation up or down differs from the slope's by more than a fifth of the whole deviation."""
+    """Return remarks on one case: the inputs along which first order is not enough, since
+    mu_macro one deviation up or down differs from the slope's by more than a fifth of the whole
+    deviation."""
     spreads = {name: x for name, x in cases.cases.std.items() if x and cases.columns[name] < np.inf}
     if not spreads:
         return []

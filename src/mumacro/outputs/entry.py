@@ -35,6 +35,6 @@ class Output(NamedTuple):
     parts: Mapping[str, str] = {}
 
     def paths(self, fields: tuple[str, ...]) -> list[str]:
-        """Its values for cases with these inputs, in order."""
+        """Return its values for cases with these inputs, in order."""
         absent = {"y0", AMPLITUDE} - {*fields}
         return [path for path in self.members if path.rpartition(".")[2] not in absent]

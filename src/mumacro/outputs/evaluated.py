@@ -58,7 +58,7 @@ class Evaluated:
             self._over_interval()
 
     def _over_interval(self) -> None:
-        """The extremes of mu_macro, and the largest bound that was met there."""
+        """Compute the extremes of mu_macro, and the largest bound that was met there."""
         low, high, bound = self.tabulated.extremes(self.cases)
         # of an interval of one point, rigid contact among them, there may be none
         self.mu_macro_low = self._take(np.fmin(self.mu_macro, low))
@@ -82,24 +82,24 @@ class Evaluated:
         return (self.y_tilde < math.inf) & self.moving
 
     def quantity(self, name: str, v: Any, y: Any, kind: Any = None) -> tuple[Any, Any]:
-        """A tabulated quantity at groups in the shape of the cases, and its bound."""
+        """Return a tabulated quantity at groups in the shape of the cases, and its bound."""
         kind = self.kind if kind is None else kind
         if not self.cases.shape:
             return self.tabulated.value(name, v, y, kind)[:2]
         return self.tabulated.values(name, v, y, kind)[:2]
 
     def crit(self, y: Any) -> Any:
-        """v~crit at amplitudes in the shape of the cases."""
+        """Return v~crit at amplitudes in the shape of the cases."""
         crit = self.tabulated.crit(np.atleast_1d(y), self.kind)
         return crit if self.cases.shape else _item(crit)
 
     def at(self, **columns: Any) -> "Evaluated":
-        """The answers to the same cases with other values of some inputs, and one k."""
+        """Return the answers to the same cases with other values of some inputs, and one k."""
         cases = self.cases._replace(columns={**self.columns, **columns}, ends=None)
         return Evaluated(self.tabulated, cases)
 
     def beside(self, columns: dict[str, Any], size: int) -> "Evaluated":
-        """The answers to other cases of this kind, in columns (size,)."""
+        """Return the answers to other cases of this kind, in columns (size,)."""
         cases = self.cases._replace(columns=columns, shape=(size,), ends=None)
         return Evaluated(self.tabulated, cases)
 
@@ -110,7 +110,7 @@ def _item(array: Array) -> float:
 
 
 def where(condition: Any, one: Any, other: Any) -> Any:
-    """``np.where``, which takes a microsecond for a single number."""
+    """Return ``np.where``, which takes a microsecond for a single number."""
     if isinstance(condition, np.ndarray):
         return np.where(condition, one, other)
     return one if condition else other

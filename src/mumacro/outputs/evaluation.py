@@ -26,7 +26,8 @@ _INTERVAL = 200.0
 
 
 def names_in(include: Iterable[str] | str) -> list[str]:
-    """The names of outputs in a list, or in a text with commas; InputError for an unknown one."""
+    """Return the names of outputs in a list, or in a text with commas; InputError for an unknown
+    one."""
     try:
         names = include.split(",") if isinstance(include, str) else [*include]
     except TypeError:
@@ -43,8 +44,8 @@ def _unknown(name: Any) -> InputError:
 
 
 def chosen(include: Iterable[str] | str, cases: Cases) -> tuple[Output, ...]:
-    """The outputs of these names, each once, in their order; with those of deviations where the
-    cases have some.
+    """Return the outputs of these names, each once, in their order; with those of deviations where
+    the cases have some.
 
     InputError for an unknown name, one that the cases lack, and std without a deviation.
     """
@@ -58,7 +59,7 @@ def chosen(include: Iterable[str] | str, cases: Cases) -> tuple[Output, ...]:
 def _chosen(
     names: frozenset[str], kind: Kind, deviations: bool, interval: bool
 ) -> tuple[Output, ...]:
-    """The same, by what of the cases it depends on."""
+    """Return the same, by what of the cases it depends on."""
     if "std" in names and not deviations:
         bound = "without std where no input has a deviation: give one, such as std_k"
         raise InputError("include", "std", bound)
@@ -74,7 +75,7 @@ def _chosen(
 
 
 def paths_of(outputs: Iterable[Output], fields: tuple[str, ...]) -> tuple[str, ...]:
-    """The paths of all values of outputs, for cases with these inputs, in order."""
+    """Return the paths of all values of outputs, for cases with these inputs, in order."""
     return _paths(tuple(output.name for output in outputs), fields)
 
 
@@ -84,8 +85,8 @@ def _paths(names: tuple[str, ...], fields: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def cost(outputs: Iterable[Output], cases: Cases) -> float:
-    """The time of one of the cases with these outputs, about, in times of mu_macro alone for one
-    spring across."""
+    """Return the time of one of the cases with these outputs, about, in times of mu_macro alone for
+    one spring across."""
     ball = cases.kind.contact == BALL.contact
     costs = ((ball and output.cost_of_ball) or output.cost for output in outputs)
     over_interval = _INTERVAL if cases.ends is not None else 1.0
@@ -102,7 +103,7 @@ def _cost_of(kind: Kind) -> float:
 def answer(
     tabulated: Tabulated, cases: Cases, outputs: tuple[Output, ...] = (), groups: bool = False
 ) -> Answer[Any]:
-    """The answer to cases with these outputs; ``groups`` keeps v~, y~ and l0, too."""
+    """Return the answer to cases with these outputs; ``groups`` keeps v~, y~ and l0, too."""
     gradient = any(output.gradient for output in outputs)
     detail: Detail = "gradient" if gradient else "groups" if outputs or groups else "values"
     if not cases.shape:
@@ -116,7 +117,7 @@ def answer(
 
 
 def _of_one(case: Evaluated, outputs: tuple[Output, ...]) -> Answer[float]:
-    """The answer to one case, in plain numbers."""
+    """Return the answer to one case, in plain numbers."""
     values: Values = {}
     with np.errstate(all="ignore"):
         for output in outputs:
@@ -144,7 +145,7 @@ def _of_one(case: Evaluated, outputs: tuple[Output, ...]) -> Answer[float]:
 def _of_many(
     tabulated: Tabulated, cases: Cases, outputs: tuple[Output, ...], detail: Detail
 ) -> Answer[Any]:
-    """The answer to cases in columns, in their shape."""
+    """Return the answer to cases in columns, in their shape."""
     columns = _columns(Evaluated(tabulated, cases, detail), outputs)
 
     def shaped(name: str) -> Any:
@@ -176,8 +177,8 @@ _SLOPES = ("gradient", "gradient_bound")
 
 
 def _columns(evaluated: Evaluated, outputs: tuple[Output, ...]) -> Values:
-    """All that is computed of cases in columns: outputs by path, and what stands beside them by
-    name; NaN where a case is not legal."""
+    """Return all that is computed of cases in columns: outputs by path, and what stands beside them
+    by name; NaN where a case is not legal."""
     columns: Values = {}
     with np.errstate(all="ignore"):
         for output in outputs:

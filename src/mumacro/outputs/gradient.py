@@ -13,14 +13,14 @@ PER = {name: PER_UNIT["Fz" if name == AMPLITUDE else name] for name in ALL_FIELD
 
 
 def slopes(cases: Evaluated) -> tuple[dict[str, Any], dict[str, Any]]:
-    """d mu_macro / d input and the bounds by field; NaN along k where contact is rigid."""
+    """Return d mu_macro / d input and the bounds by field; NaN along k where contact is rigid."""
     no_slope = where(cases.rigid, math.nan, 0.0)
     slopes, bounds = cases.gradient, cases.gradient_bound
     return {**slopes, "k": slopes["k"] + no_slope}, {**bounds, "k": bounds["k"] + no_slope}
 
 
 def gradient(cases: Evaluated) -> Values:
-    """d mu_macro / d input, with bounds."""
+    """Return d mu_macro / d input, with bounds."""
     of_inputs, bounds = slopes(cases)
     return {f"gradient.{name}": slope for name, slope in of_inputs.items()} | {
         f"gradient_bound.{name}": bound for name, bound in bounds.items()

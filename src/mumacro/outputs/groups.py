@@ -5,7 +5,7 @@ from mumacro.outputs.evaluated import Evaluated
 
 
 def groups(cases: Evaluated) -> Values:
-    """v~ = v0/(l0 omega), y~ = y0/l0 and l0 = mu0 Fz/k, eq. (5)."""
+    """Return v~ = v0/(l0 omega), y~ = y0/l0 and l0 = mu0 Fz/k, eq. (5)."""
     return {
         "groups.v_tilde": cases.v_tilde,
         "groups.y_tilde": cases.y_tilde,

@@ -7,7 +7,8 @@ from mumacro.outputs.evaluated import Evaluated, where
 
 
 def limits(cases: Evaluated) -> Values:
-    """mu_macro at rest; the speed at the border of continuous sliding, and mu_macro there."""
+    """Return mu_macro at rest; the speed at the border of continuous sliding, and mu_macro
+    there."""
     omega = cases.columns["omega"]
     if cases.words["direction"] == "along":  # where the contact begins to slide backwards
         speed = cases.columns["y0"] * omega

@@ -18,7 +18,8 @@ _DENORMAL = 1e-323  # two of the least numbers
 
 
 def power(cases: Evaluated) -> Values:
-    """mu0 Fz l0 omega <y~ cos tau u_y> of the shaker, (mu0 - mu_macro) Fz v0 saved by the drive."""
+    """Return mu0 Fz l0 omega <y~ cos tau u_y> of the shaker, (mu0 - mu_macro) Fz v0 saved by the
+    drive."""
     mu0, load, omega, v0 = (cases.columns[name] for name in ("mu0", "Fz", "omega", "v0"))
     v, y = (where(cases.usable, group, 1.0) for group in (cases.v_tilde, cases.y_tilde))
     number, bound = cases.quantity("power", v, y)
@@ -46,8 +47,8 @@ def power(cases: Evaluated) -> Values:
 
 
 def _at_the_ends(cases: Evaluated, here: Any, *of_table: Any) -> tuple[Array, Array, Array, Array]:
-    """The same where a group or a product may leave the range of numbers though the result does
-    not: products as a whole; NaN where the power is 0 or does not exist."""
+    """Return the same where a group or a product may leave the range of numbers though the result
+    does not: products as a whole; NaN where the power is 0 or does not exist."""
     size = np.size(cases.mu_ratio)
     mu0, load, k, y0, omega, v0 = (np.broadcast_to(x, size)[here] for x in cases.columns.values())
     v, y, number, bound, ratio, error, elastic = (
@@ -84,7 +85,7 @@ def _at_the_ends(cases: Evaluated, here: Any, *of_table: Any) -> tuple[Array, Ar
 
 
 def _product(factors: tuple[Array, ...], divisors: tuple[Array, ...] = ()) -> Array:
-    """A product whose parts may leave the range of numbers, rounded to it at the end."""
+    """Return a product whose parts may leave the range of numbers, rounded to it at the end."""
     mantissa, exponent = np.ones(factors[0].size), np.zeros(factors[0].size, np.int64)
     for x in factors:
         part, power_of_two = np.frexp(x)

@@ -54,7 +54,7 @@ class Decay(NamedTuple):
 
 
 def decay_of_springs(tabulated: Tabulated, v: Array, y: Array) -> Decay:
-    """The decay of springs at finite v~, y~."""
+    """Return the decay of springs at finite v~, y~."""
     (ratio, off), (power, power_off), (stick, stick_off) = (
         tabulated.values(name, v, y, SPRING)[:2] for name in ("mu_ratio", "power", "stick_fraction")
     )
@@ -76,7 +76,7 @@ def decay_of_springs(tabulated: Tabulated, v: Array, y: Array) -> Decay:
 
 
 def _size_of_cosine(turn: Array) -> Array:
-    """ln abs(cos) of an angle, from 1 - cos of it."""
+    """Return ln abs(cos) of an angle, from 1 - cos of it."""
     rest = np.clip(np.where(turn < 1.0, turn, 2.0 - turn), 0.0, 1.0)
     return np.asarray(np.log1p(-rest))
 
@@ -88,8 +88,8 @@ AT_ONCE = 128  # balls
 
 
 def decay_of_balls(tabulated: Tabulated, v: Array, y: Array) -> Decay:
-    """The decay of the slowest springs of balls at finite v~, y~ of their middle springs; the rate
-    is that of the middle one."""
+    """Return the decay of the slowest springs of balls at finite v~, y~ of their middle springs;
+    the rate is that of the middle one."""
     parts = [
         _decay_of_balls(tabulated, v[start : start + AT_ONCE], y[start : start + AT_ONCE])
         for start in range(0, max(v.size, 1), AT_ONCE)
@@ -122,9 +122,9 @@ def _decay_of_balls(tabulated: Tabulated, v: Array, y: Array) -> Decay:
 def _along_rays(
     tabulated: Tabulated, v: Array, y: Array, low: Array, high: Array, count: int
 ) -> tuple[Decay, Array, NDArray[np.intp]]:
-    """The decay of springs at ``count`` places along the ray of each ball, from ``low`` to ``high``
-    as logarithms of v~ and y~ over those of the middle spring; these places, and which spring is
-    the slowest."""
+    """Return the decay of springs at ``count`` places along the ray of each ball, from ``low`` to
+    ``high`` as logarithms of v~ and y~ over those of the middle spring; these places, and which
+    spring is the slowest."""
     places = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, count)
     with np.errstate(over="ignore"):
         ray = [np.minimum((x[:, None] * np.exp(places)).ravel(), 1e300) for x in (v, y)]
@@ -134,9 +134,9 @@ def _along_rays(
 
 @np.errstate(all="ignore")
 def decay(cases: Evaluated, remaining: float = REMAINING) -> tuple[Any, Any, Any, Any, Any]:
-    """Periods until a small disturbance has fallen to ``remaining``, and until any has, the time of
-    the former [s], the slip path of a period over l0, and the bound of the error of the first; for
-    oscillation across."""
+    """Return periods until a small disturbance has fallen to ``remaining``, and until any has, the
+    time of the former [s], the slip path of a period over l0, and the bound of the error of the
+    first; for oscillation across."""
     load_ratio = SPRINGS_OF[CONTACTS[cases.kind.contact]].middle_load
     speed, frequency, moving, ratio, length, v, y = np.atleast_1d(
         *(cases.columns["v0"], cases.columns["omega"], cases.moving),
@@ -173,7 +173,7 @@ def decay(cases: Evaluated, remaining: float = REMAINING) -> tuple[Any, Any, Any
 
 
 def settling(cases: Evaluated) -> Values:
-    """Periods until a disturbed contact is within 1 % of its steady cycle."""
+    """Return periods until a disturbed contact is within 1 % of its steady cycle."""
     periods, any_size, time, slip_path, bound = decay(cases)
     return {
         "settling.periods": periods,

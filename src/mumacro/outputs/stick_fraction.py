@@ -7,7 +7,7 @@ from mumacro.outputs.evaluated import Evaluated, where
 
 
 def stick_fraction(cases: Evaluated) -> Values:
-    """Share of the period during which the contact sticks."""
+    """Return share of the period during which the contact sticks."""
     value, bound = cases.quantity("stick_fraction", cases.v_tilde, cases.y_tilde)
     # y~ below double range: the groups do not show whether such a contact sticks
     lost = (cases.y_tilde == 0.0) & (cases.v_tilde < math.inf) & cases.moving

@@ -45,13 +45,13 @@ class Tabulated:
         self.pointer = self._springs.pointer
 
     def on_one_thread(self) -> Self:
-        """The same cells, whose calls start no thread."""
+        """Return the same cells, whose calls start no thread."""
         other = copy.copy(self)
         other.threads = 1
         return other
 
     def data(self, name: str = "mu_ratio", kind: Kind = SPRING) -> Data:
-        """What the kernel reads of a quantity of a kind; its cells are cut on first use.
+        """Return what the kernel reads of a quantity of a kind; its cells are cut on first use.
 
         A table has cells of every contact that is shaken across; other directions are computed from
         closed forms of one spring, of a ball by a quadrature over springs.
@@ -69,7 +69,7 @@ class Tabulated:
         return data
 
     def _cells_of(self, code: int) -> Data:
-        """A contact with the cells of mu~."""
+        """Return a contact with the cells of mu~."""
         contact = self.table.contacts[CONTACTS[code]]
         data = Data(*self.border.arrays, block_rows(contact), outer_cells())
         data.add_quantity(atlas.MU, *quantity_cells(contact, atlas.MU))
@@ -78,33 +78,33 @@ class Tabulated:
     # --- points (v~, y~) --------------------------------------------------------------------------
 
     def ratios(self, v: Array, y: Array) -> Array:
-        """mu~ of one spring across at points (n,), without its bound."""
+        """Return mu~ of one spring across at points (n,), without its bound."""
         return slices.values_without_bounds(atlas.MU, self._springs, v, y, self.threads)
 
     def values(
         self, name: str, v: Array, y: Array, kind: Kind = SPRING
     ) -> tuple[Array, Array, Codes]:
-        """A quantity at points (n,), its bound, and the source codes."""
+        """Return a quantity at points (n,), its bound, and the source codes."""
         return slices.values(CODES[name], self.data(name, kind), v, y, self.threads, kind)
 
     def value(self, name: str, v: float, y: float, kind: Kind = SPRING) -> tuple[float, float, int]:
-        """The same at one point."""
+        """Return the same at one point."""
         if kind.direction:
             value, bound, source = self.values(name, np.array([v]), np.array([y]), kind)
             return float(value[0]), float(bound[0]), int(source[0])
         return SCALAR_KERNEL.value(self.data(name, kind), CODES[name], v, y, kind.contact)
 
     def slopes(self, name: str, v: Array, y: Array, kind: Kind = SPRING) -> SlopeRows:
-        """A quantity across at points (n,), with its slopes and their bounds."""
+        """Return a quantity across at points (n,), with its slopes and their bounds."""
         return slices.slopes(CODES[name], self.data(name, kind), v, y, self.threads, kind.contact)
 
     def crit(self, y: Array, kind: Kind = SPRING) -> Array:
-        """v~crit at amplitudes (n,)."""
+        """Return v~crit at amplitudes (n,)."""
         return _KERNEL.border(self._springs, y, kind)
 
     def certain(self, v_tilde: Any, y_tilde: Any, kind: Kind = SPRING) -> Bools:
-        """Whether v~ is further from v~crit than the error of v~crit and the rounding of v~ and y~
-        together, in the shape of both."""
+        """Return whether v~ is further from v~crit than the error of v~crit and the rounding of v~
+        and y~ together, in the shape of both."""
         v, y = np.asarray(v_tilde), np.asarray(y_tilde)
         crit = self.crit(np.ravel(y).astype(np.float64), kind).reshape(y.shape)
         margin = self.border.max_rel_error + 4.0 * atlas.ROUNDING
@@ -116,18 +116,18 @@ class Tabulated:
     # --- cases ------------------------------------------------------------------------------------
 
     def one(self, six: Sequence[Any], gradient: bool = False, contact: int = 0) -> Any:
-        """One case across in plain numbers: a ``mumacro_case``, see ``kernel/data.h``."""
+        """Return one case across in plain numbers: a ``mumacro_case``, see ``kernel/data.h``."""
         data = self._across.get(contact) or self.data(kind=Kind(contact, SPRING.direction))
         return SCALAR_KERNEL.one(data.pointer, six, gradient, contact)
 
     def rows(self, cases: Cases, detail: Detail = "values") -> CaseRows:
-        """Answers to cases of one kind, in their shape, (1,) for one case."""
+        """Return answers to cases of one kind, in their shape, (1,) for one case."""
         kind, shape = cases.kind, cases.shape or (1,)
         six = [*cases.columns.values()]
         return slices.cases(self.data(kind=kind), six, shape, self.threads, detail, kind)
 
     def extremes(self, cases: Cases) -> ExtremeRows:
-        """Extremes of mu_macro over intervals of k, (n,) each."""
+        """Return extremes of mu_macro over intervals of k, (n,) each."""
         if cases.ends is None:
             raise TypeError("the cases have one k each")
         low, high = cases.ends

@@ -51,8 +51,8 @@ def border_crossings(
     direction: str = "across",
     stiffening: Stiffening | None = None,
 ) -> tuple[Crossing, ...]:
-    """Where in ``low <= along <= high`` continuous sliding or (along) reverse slip begins or ends,
-    ascending.
+    """Return where in ``low <= along <= high`` continuous sliding or (along) reverse slip begins or
+    ends, ascending.
 
     ``case`` holds the other five inputs, of which k grows with Fz where there is a ``stiffening``.
     Of continuous sliding none, one, or (across, over mu0, Fz or k) two places; none for rigid

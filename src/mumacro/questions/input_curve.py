@@ -48,18 +48,19 @@ class InputCurve:
         strict: bool = False,
         **others: Any,
     ) -> Answer[Any]:
-        """The surrogate's results at the values ``x`` (n,) of the input [SI]; ``others`` replace
-        inputs of the case.  InputError for a value out of bounds where ``strict``, else NaN."""
+        """Return the surrogate's results at the values ``x`` (n,) of the input [SI]; ``others``
+        replace inputs of the case. InputError for a value out of bounds where ``strict``, else
+        NaN."""
         cases = self.cases(x, strict, **others)
         return self.surrogate.answer(cases, (GRADIENT,) if gradient else (), groups)
 
     def cases(self, x: Any, strict: bool, **others: Any) -> Cases:
-        """The cases that :meth:`answer` evaluates; ``others`` may have deviations, too."""
+        """Return the cases that :meth:`answer` evaluates; ``others`` may have deviations, too."""
         k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
         return Cases.of({**self.case, **k, self.unknown: x, **others}, self.kind, strict)
 
     def groups(self, x: float) -> tuple[float, float]:
-        """v~ and y~ at one value of the input, from the inputs alone."""
+        """Return v~ and y~ at one value of the input, from the inputs alone."""
         c = self.cases(x, True).columns
         swing = c[AMPLITUDE] / c["Fz"] if self.kind.normal else None
         with np.errstate(all="ignore"):
@@ -68,7 +69,7 @@ class InputCurve:
             return float(c["v0"] / np.float64(c["omega"]) * stiffness), float(y)
 
     def mu(self, x: Array) -> Array:
-        """mu_macro [-] at ``x`` (n,)."""
+        """Return mu_macro [-] at ``x`` (n,)."""
         return np.asarray(self.answer(x).mu_macro)
 
     def at(self, x: Array) -> tuple[Array, Array]:
@@ -77,7 +78,7 @@ class InputCurve:
         return np.asarray(answer.mu_macro), np.asarray(answer.error_bound)
 
     def refined(self, values: Array) -> Array:
-        """``values`` and more between them, where chords of mu_macro differ from it."""
+        """Return ``values`` and more between them, where chords of mu_macro differ from it."""
         mu = self.mu(values)
         for _ in range(_HALVINGS):
             low, high = values[:-1], values[1:]
@@ -94,8 +95,8 @@ class InputCurve:
         return values
 
     def where(self, group: float) -> float:
-        """Value of k, Fz or mu0 at which y~, for normal v~/z, is ``group``, within double range;
-        any value for a rigid contact."""
+        """Return value of k, Fz or mu0 at which y~, for normal v~/z, is ``group``, within double
+        range; any value for a rigid contact."""
         reference = self.answer(1.0 if self.stiffening is None else self.stiffening.load)
         reference_group = float(
             reference.v_tilde / reference.y_tilde if self.kind.normal else reference.y_tilde

@@ -136,8 +136,8 @@ class Law(Result):
 
 
 def sweep_values(along: str, start: float, stop: float, points: int, scale: str) -> Array:
-    """``points`` values from ``start`` to ``stop``, both included exactly, even on a ``scale``
-    "log" or "linear".
+    """Return ``points`` values from ``start`` to ``stop``, both included exactly, even on a
+    ``scale`` "log" or "linear".
 
     InputError for ends out of bounds or not ascending, a logarithmic range from 0, fewer than two
     points.
@@ -164,14 +164,14 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
 
 
 def _end(along: str, name: str, value: Any) -> float:
-    """One end of the range of an input as a float."""
+    """Return one end of the range of an input as a float."""
     if value is None:
         raise InputError(name, None, "given [SI]: the range goes from start to stop")
     return read_one(name, value, QUANTITY_OF[along])
 
 
 def _ascending(along: str, values: Any) -> Array:
-    """Values of the swept input, (n,)."""
+    """Return values of the swept input, (n,)."""
     x = np.asarray(to_si("values", values, QUANTITY_OF[along]))
     if x.ndim != 1 or not x.size or not np.all(np.diff(x) >= 0.0):
         raise InputError("values", values, "one-dimensional and ascending")
@@ -179,7 +179,8 @@ def _ascending(along: str, values: Any) -> Array:
 
 
 def _apart(case: Mapping[str, Any], swept: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The exact inputs of a case, and the deviations of those that have one, std_k and so on."""
+    """Return the exact inputs of a case, and the deviations of those that have one, std_k and so
+    on."""
     inputs = named(None, {name: x for name, x in case.items() if x is not None or name == "k"})
     deviations = {name: inputs.pop(name) for name in DEVIATIONS if name in inputs}
     for name in inputs.keys() & QUANTITY_OF.keys():
@@ -214,7 +215,7 @@ def law(
     stiffness_exponent: float | None = None,
     **case: Any,
 ) -> Law:
-    """The friction law: mu_macro over a range of one input.
+    """Return the friction law: mu_macro over a range of one input.
 
     Parameters
     ----------

@@ -165,7 +165,7 @@ class TableSolution(Solution):
 
 
 def _around(roots: Sequence[float]) -> tuple[float, float]:
-    """A decade around roots; what is at 0 is shown up to 1."""
+    """Return a decade around roots; what is at 0 is shown up to 1."""
     least, most = min(roots), max(roots)
     return 0.1 * least or 1e-6 * (most or 1.0), 10.0 * most or 1.0
 
@@ -182,7 +182,7 @@ def solve_for(
     stiffness_exponent: float | None = None,
     **case: Any,
 ) -> TableSolution:
-    """Every value of one input at which mu_macro is ``target``.
+    """Return every value of one input at which mu_macro is ``target``.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def solve_for(
 
 
 def _levels(target: Numbers) -> Array:
-    """The targets, (n,); InputError for one that mu_macro cannot be."""
+    """Return the targets, (n,); InputError for one that mu_macro cannot be."""
     levels = real("target", target).ravel()
     bad = np.flatnonzero(~(np.isfinite(levels) & (levels >= 0.0)))
     if bad.size:
@@ -305,7 +305,7 @@ def _solution_over(
 
 
 def _in_unit(solution: TableSolution, unknown: str, per: float) -> TableSolution:
-    """A solution by another name of the unknown, whose unit has ``per`` of the field's."""
+    """Return a solution by another name of the unknown, whose unit has ``per`` of the field's."""
     roots = tuple(
         tuple(
             root._replace(value=root.value / per, low=root.low / per, high=root.high / per)
@@ -321,7 +321,7 @@ def _in_unit(solution: TableSolution, unknown: str, per: float) -> TableSolution
 
 
 def _ends(unknown: str, within: Any) -> tuple[float, float]:
-    """Both ends of a range of the unknown, in its SI unit."""
+    """Return both ends of a range of the unknown, in its SI unit."""
     try:
         low, high = within
     except (TypeError, ValueError) as error:
@@ -331,7 +331,7 @@ def _ends(unknown: str, within: Any) -> tuple[float, float]:
 
 
 def _legal(curve: InputCurve) -> tuple[float, float]:
-    """Smallest and largest legal value of the unknown."""
+    """Return smallest and largest legal value of the unknown."""
     low, high = TINY if curve.unknown in POSITIVE else 0.0, HUGE
     if curve.kind.normal and curve.unknown == "Fz":
         low = math.nextafter(curve.case[AMPLITUDE], math.inf)
@@ -350,8 +350,8 @@ def _checked_range(curve: InputCurve, within: tuple[float, float]) -> tuple[floa
 
 
 def _default_range(curve: InputCurve, targets: Array) -> tuple[float, float]:
-    """All legal values; or from a soft contact to a rigid one, to 1e-12 or so, and further where
-    the targets need it."""
+    """Return all legal values; or from a soft contact to a rigid one, to 1e-12 or so, and further
+    where the targets need it."""
     case, unknown, (least, most) = curve.case, curve.unknown, _legal(curve)
     if unknown in EVERYWHERE:
         return least, most
@@ -364,7 +364,7 @@ def _default_range(curve: InputCurve, targets: Array) -> tuple[float, float]:
 
 
 def _soft_to_rigid(curve: InputCurve, targets: Array, least: float) -> tuple[float, float]:
-    """The range for k, Fz and mu0, whose smallest legal value is ``least``."""
+    """Return the range for k, Fz and mu0, whose smallest legal value is ``least``."""
     case, unknown = curve.case, curve.unknown
     amplitude = case[AMPLITUDE if curve.kind.normal else "y0"]
     if 0.0 in (amplitude, case["omega"]) or curve.proportional:
@@ -392,7 +392,7 @@ def _soft_to_rigid(curve: InputCurve, targets: Array, least: float) -> tuple[flo
 
 
 def _without_limit(curve: InputCurve, reach: Reach) -> Reach:
-    """``reach`` as v0, y0 or omega grows without limit: the last value is approached, and in
+    """Return ``reach`` as v0, y0 or omega grows without limit: the last value is approached, and in
     general not reached."""
     if curve.unknown == "v0":
         return replace(reach, max_included=curve.kind.direction > 0)

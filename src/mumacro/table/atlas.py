@@ -94,7 +94,7 @@ class Axis:
         return (0.0, self.edge[0]) if self.knotted else (self.low, self.high)
 
     def to_file(self, x: Array) -> Array:
-        """The table file's coordinate at evaluation's ``x`` (n,)."""
+        """Return the table file's coordinate at evaluation's ``x`` (n,)."""
         if self.name == "angle":
             return np.asarray(4.0 / np.pi * np.arctan(x), dtype=np.float64)
         if self.name == "angle_root":
@@ -111,7 +111,7 @@ class Axis:
         return np.asarray(2.0 / math.pi * np.where(x <= math.sqrt(0.5), low, high))
 
     def to_evaluation(self, x: Array) -> Array:
-        """Evaluation's coordinate at the table file's ``x`` (n,)."""
+        """Return evaluation's coordinate at the table file's ``x`` (n,)."""
         if self.name == "angle":
             return np.asarray(np.tan(0.25 * np.pi * x), dtype=np.float64)
         if self.name == "angle_root":
@@ -125,7 +125,7 @@ class Axis:
         return np.where(x <= 0.5, np.sin(0.5 * np.pi * x), SQRT2 - np.cos(0.5 * np.pi * x))
 
     def amplitude(self, x: Array) -> Array:
-        """y~ at the table file's coordinate ``x``, if this is an axis of amplitudes."""
+        """Return y~ at the table file's coordinate ``x``, if this is an axis of amplitudes."""
         if self.name == "y_squared":
             return np.asarray(np.sqrt(x), dtype=np.float64)
         if self.name == "ln_y":
@@ -136,7 +136,7 @@ class Axis:
 
 
 def _cosine(share: Array, rest: Array, name: str) -> Array:
-    """cos(pi/2 share), by the sine of the rest where that is what is known."""
+    """Return cos(pi/2 share), by the sine of the rest where that is what is known."""
     return np.asarray(
         np.cos(0.5 * math.pi * share) if name == "angle" else np.sin(0.5 * math.pi * rest)
     )
@@ -177,7 +177,8 @@ class Chart:
     def point(
         self, a: Array, b: Array, border_of: Callable[[Array], Array]
     ) -> tuple[Array, Array, Array]:
-        """(v~, y~, eta = y~ - 1) at the table file's coordinates ``a``, ``b`` (broadcast together).
+        """Return (v~, y~, eta = y~ - 1) at the table file's coordinates ``a``, ``b`` (broadcast
+        together).
 
         eta is exact in the corner, where rounding y~ to double costs 1e-16/mu~.  ``border_of``
         gives v~crit(y~): the stored curve, so that nodes and evaluation use the same one.
@@ -213,7 +214,7 @@ class Chart:
         return v, y, y - 1.0
 
     def holds(self, quantity: Quantity) -> bool:
-        """Whether the block tabulates a quantity; elsewhere it is zero."""
+        """Return whether the block tabulates a quantity; elsewhere it is zero."""
         return self.regime != CONTINUOUS or quantity.while_sliding
 
 

@@ -26,8 +26,8 @@ def to_disk(stream: BinaryIO) -> None:
 
 @contextmanager
 def growing(path: Path) -> Iterator[BinaryIO]:
-    """A file to be written within the block; at its end it is on the disk, whole, and takes the
-    place of an older one.
+    """Yield a file to be written within the block; at its end it is on the disk, whole, and takes
+    the place of an older one.
 
     An exception leaves nothing behind, and an older file stays.  On Linux the new file has no name
     before its end: a killed process leaves nothing, either.
@@ -50,7 +50,7 @@ def growing(path: Path) -> Iterator[BinaryIO]:
 
 
 def _without_name(folder: Path) -> int | None:
-    """A new file without a name in a folder; None where the system or its disk has none."""
+    """Return a new file without a name in a folder; None where the system or its disk has none."""
     if not hasattr(os, "O_TMPFILE") or not Path("/proc/self/fd").is_dir():
         return None
     try:

@@ -60,7 +60,7 @@ INTERPOLATION_STATISTICS = {"median": "0.5", "99_percent": "0.99", "largest": "1
 
 
 def interpolation_error(method: str, statistic: str) -> str:
-    """The attribute of the root that states an error of interpolating the plain grid."""
+    """Return the attribute of the root that states an error of interpolating the plain grid."""
     return f"interpolation_error_{method}_{statistic}"
 
 
@@ -139,10 +139,10 @@ class Table:
         }
 
     def quantities_of(self, chart: atlas.Chart) -> list[atlas.Quantity]:
-        """The quantities that the block of ``chart`` tabulates."""
+        """Return the quantities that the block of ``chart`` tabulates."""
         return [BY_NAME[name] for name in self.quantities if chart.holds(BY_NAME[name])]
 
 
 def names_in(attributes: dict[str, Any]) -> list[str]:
-    """The names of the tabulated quantities in the attributes of a table."""
+    """Return the names of the tabulated quantities in the attributes of a table."""
     return str(attributes.get("quantities")).split()

@@ -9,8 +9,8 @@ _CHECKOUT = _PACKAGE.parent.parent  # of a checkout, whose library stands in src
 
 
 def bundled_tables() -> list[Path]:
-    """The table files that come with the library, by name: of the installed wheel, else of the
-    checkout.
+    """Return the table files that come with the library, by name: of the installed wheel, else of
+    the checkout.
 
     >>> sorted(path.name for path in bundled_tables())[0]
     'mumacro-1e-10.nc'
@@ -24,7 +24,7 @@ def bundled_tables() -> list[Path]:
 
 
 def bundled_table(tolerance: float | None) -> Path:
-    """The tightest bundled table, or the smallest that meets ``tolerance``."""
+    """Return the tightest bundled table, or the smallest that meets ``tolerance``."""
     tables = {float(path.stem.removeprefix("mumacro-")): path for path in bundled_tables()}
     if not tables:
         raise TableError("mumacro-*.nc", "no table is bundled with this installation; name a file")

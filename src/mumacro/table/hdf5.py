@@ -33,7 +33,7 @@ class Group:
         self._id, self.path, self._size, self.refuse = handle, path, size, refuse
 
     def holds(self, name: str) -> bool:
-        """Whether there is a group or variable of this name."""
+        """Return whether there is a group or variable of this name."""
         return bool(self._id.links.exists(name.encode()))
 
     def _open(self, name: str, part_type: type, role: str) -> Any:
@@ -46,25 +46,25 @@ class Group:
         return part
 
     def group(self, name: str) -> "Group":
-        """A group in this one."""
+        """Return a group in this one."""
         path = f"{self.path.rstrip('/')}/{name}"
         return Group(self._open(name, h5g.GroupID, "group"), path, self._size, self.refuse)
 
     # --- attributes -------------------------------------------------------------------------------
 
     def has(self, name: str) -> bool:
-        """Whether there is such an attribute."""
+        """Return whether there is such an attribute."""
         return bool(h5a.exists(self._id, name.encode()))
 
     def attribute(self, name: str) -> Any:
-        """Text, a number, or a vector of numbers (n,) with n > 1."""
+        """Return text, a number, or a vector of numbers (n,) with n > 1."""
         if not self.has(name):
             raise self.refuse(f"attribute {name!r} of {self.path} is missing")
         return self._value(name, h5a.open(self._id, name.encode()))
 
     def attributes(self) -> dict[str, Any]:
-        """All attributes but those of the netCDF library itself, in the order in which they were
-        made."""
+        """Return all attributes but those of the netCDF library itself, in the order in which they
+        were made."""
         count, by_age = h5a.get_num_attrs(self._id), h5py.h5.INDEX_CRT_ORDER
         if count > MOST_ATTRIBUTES:
             raise self.refuse(f"{self.path} has more than {MOST_ATTRIBUTES} attributes")
@@ -77,7 +77,7 @@ class Group:
         }
 
     def numbers(self, name: str, count: int) -> Array:
-        """An attribute of ``count`` finite numbers."""
+        """Return an attribute of ``count`` finite numbers."""
         values = np.atleast_1d(np.asarray(self.attribute(name)))
         if (
             values.dtype.kind not in "fi"
@@ -102,8 +102,8 @@ class Group:
     # --- numbers ----------------------------------------------------------------------------------
 
     def array(self, name: str, most: int, shape: tuple[int, ...] | None = None) -> Array:
-        """A variable of finite float64, of at most ``most`` numbers, as the netCDF library stores
-        numbers."""
+        """Return a variable of finite float64, of at most ``most`` numbers, as the netCDF library
+        stores numbers."""
         dataset = self._open(name, h5d.DatasetID, "variable")
         space, creation = dataset.get_space(), dataset.get_create_plist()
         is_double = space.get_simple_extent_type() == h5s.SIMPLE and dataset.get_type().equal(
@@ -129,7 +129,7 @@ class Group:
         return values
 
     def _unpack(self, dataset: Any, name: str, filters: tuple[int, ...]) -> Array:
-        """The one chunk of a variable, unpacked here with a limit: HDF5 itself has none."""
+        """Return the one chunk of a variable, unpacked here with a limit: HDF5 itself has none."""
         size = 8 * math.prod(dataset.shape)
         if (
             dataset.get_num_chunks() != 1
@@ -149,7 +149,8 @@ class Group:
 
 
 def open_image(image: bytes, refuse: Refuse) -> Group:
-    """The root of a file in memory; ``refuse`` makes the exception that is raised from a reason.
+    """Return the root of a file in memory; ``refuse`` makes the exception that is raised from a
+    reason.
 
     h5py raises nearly any exception where the bytes are no HDF5.
     """

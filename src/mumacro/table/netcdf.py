@@ -72,7 +72,7 @@ LEAST_PACKED = 256  # numbers: as few are stored as they are, since a chunk's in
 
 
 def _digest(table: Table) -> str:
-    """SHA-256 over every number that affects a value or its bound, the geometry, and the
+    """Return SHA-256 over every number that affects a value or its bound, the geometry, and the
     tolerance."""
     h = hashlib.sha256()
 
@@ -117,7 +117,7 @@ def _add_variable(
     axes: tuple[str, ...] = (),
     **attributes: Any,
 ) -> None:
-    """A float64 variable over ``axes``; without them it is a coordinate itself."""
+    """Add a float64 variable over ``axes``; without them it is a coordinate itself."""
     if not axes:
         group.createDimension(name, data.size)
     filters = {"compression": "zlib", "complevel": 9, "shuffle": True, "chunksizes": data.shape}
@@ -128,8 +128,8 @@ def _add_variable(
 
 
 def _write_cell_errors(group: Any, blocks: list[Block], names: Sequence[str]) -> None:
-    """The errors in all cells, block after block, as one variable: each costs half a kilobyte, and
-    a dimension too."""
+    """Write the errors in all cells, block after block, as one variable: each costs half a
+    kilobyte, and a dimension too."""
 
     def rows(block: Block, name: str) -> Array:
         return (
@@ -181,7 +181,7 @@ def _write(root: Any, table: Table) -> None:
 
 
 def _write_contact(group: Any, table: Table, contact: TabulatedContact) -> None:
-    """The blocks of a contact with the errors in every cell, and what is stated of them."""
+    """Write the blocks of a contact with the errors in every cell, and what is stated of them."""
     group.setncatts(contact.attributes)
     _write_cell_errors(group, contact.blocks, table.quantities)
     for chart, block in zip(contact.charts, contact.blocks, strict=True):
@@ -238,7 +238,7 @@ def write_table(table: Table, path: str | Path) -> str:
 
 
 def _image(table: Table) -> bytes:
-    """The bytes of a file that holds ``table``.
+    """Return the bytes of a file that holds ``table``.
 
     A temporary file: where the disk is full the netCDF library reports little and keeps the file
     open.  A file that it makes in memory contains the time of day.
@@ -258,7 +258,7 @@ def _image(table: Table) -> bytes:
 
 
 def _nodes(group: hdf5.Group, axis: atlas.Axis) -> Array:
-    """The nodes of an axis, which must be those of the running atlas."""
+    """Return the nodes of an axis, which must be those of the running atlas."""
     values = group.array(axis.name, MOST_NUMBERS)
     if values.ndim != 1 or not 2 <= values.size <= MOST_NODES:
         raise group.refuse(f"{group.path}: {axis.name!r} has not 2 to {MOST_NODES} nodes")
@@ -300,7 +300,7 @@ def _check_same(group: hdf5.Group, name: str, expected: Any) -> None:
 
 
 def _contact_attributes(group: hdf5.Group) -> dict[str, Any]:
-    """What a table states of a contact; what the program uses is checked."""
+    """Return what a table states of a contact; what the program uses is checked."""
     for name in _STATED:
         if not group.numbers(name, 1)[0] > 0.0:
             raise group.refuse(
@@ -317,7 +317,7 @@ def _contact_attributes(group: hdf5.Group) -> dict[str, Any]:
 
 
 def _attributes(root: hdf5.Group) -> dict[str, Any]:
-    """The attributes of the root; those that the program uses are checked."""
+    """Return the attributes of the root; those that the program uses are checked."""
     if not all(map(root.has, ("format_version", "content_sha256"))):
         raise root.refuse("not a mumacro table: format_version or content_sha256 is missing")
     version = root.attribute("format_version")
@@ -421,7 +421,8 @@ def read_table(path: str | Path) -> Table:
 
 
 def parse_table(image: bytes, path: str | Path) -> Table:
-    """As :func:`read_table`, from the bytes of the file; ``path`` names it in errors."""
+    """Read a table as :func:`read_table`, from the bytes of the file; ``path`` names it in
+    errors."""
     try:
         table = _read(hdf5.open_image(image, lambda reason: TableError(path, reason)))
         digest = _digest(table)
@@ -439,8 +440,8 @@ def parse_table(image: bytes, path: str | Path) -> Table:
 
 
 def read_image(path: str | Path) -> bytes:
-    """The bytes of a table file; TableError where it is missing, unreadable, or larger than any
-    table."""
+    """Return the bytes of a table file; TableError where it is missing, unreadable, or larger than
+    any table."""
     path = Path(path)
     try:
         if not path.is_file():
@@ -455,7 +456,8 @@ def read_image(path: str | Path) -> bytes:
 
 
 def json_attributes(table: Table) -> dict[str, object]:
-    """Root attributes as plain Python numbers, lists and strings; ``builder_options`` parsed."""
+    """Return root attributes as plain Python numbers, lists and strings; ``builder_options``
+    parsed."""
     out = {
         key: value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
         for key, value in table.attributes.items()

@@ -29,13 +29,13 @@ _TO_POWERS: Array = np.linalg.inv(np.vander(LOCAL, WIDTH))
 
 
 def nodes(n: int, low: float, high: float) -> Array:
-    """Chebyshev points of the first kind on [low, high], ascending, shape (n,)."""
+    """Return Chebyshev points of the first kind on [low, high], ascending, shape (n,)."""
     x = -np.cos((np.arange(n) + 0.5) * np.pi / n)
     return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * x, dtype=np.float64)
 
 
 def coefficient_matrix(n: int) -> Array:
-    """Matrix (n, n) from values at ``n`` :func:`nodes` to the Chebyshev coefficients of the
+    """Return matrix (n, n) from values at ``n`` :func:`nodes` to the Chebyshev coefficients of the
     interpolant."""
     # the angle in whole parts of a turn: rounding it is seen in second derivatives at the edges
     parts = np.outer(np.arange(n), 2 * np.arange(n, 0, -1) - 1) % (4 * n)
@@ -45,8 +45,8 @@ def coefficient_matrix(n: int) -> Array:
 
 
 def chebyshev_coefficients(values: Array) -> Array:
-    """Chebyshev coefficients of the interpolant through ``values`` at :func:`nodes`, along every
-    axis."""
+    """Return Chebyshev coefficients of the interpolant through ``values`` at :func:`nodes`, along
+    every axis."""
     out = np.asarray(values, dtype=np.float64)
     for axis in range(out.ndim):
         matrix = coefficient_matrix(out.shape[axis])
@@ -58,13 +58,13 @@ def chebyshev_coefficients(values: Array) -> Array:
 
 
 def interpolation_matrix(n: int, t: Array) -> Array:
-    """Matrix (len(t), n) from Chebyshev coefficients to values at ``t`` in [-1, 1]."""
+    """Return matrix (len(t), n) from Chebyshev coefficients to values at ``t`` in [-1, 1]."""
     return np.asarray(chebyshev.chebvander(t, n - 1), dtype=np.float64)
 
 
 def _count(axis: Axis, cells: int) -> tuple[float, float]:
-    """(offset, step) with which step * coordinate + offset counts cells from 0; its whole part is
-    the cell.
+    """Return (offset, step) with which step * coordinate + offset counts cells from 0; its whole
+    part is the cell.
 
     The far end is slightly below ``cells``, so that it belongs to the last cell.
     """
@@ -74,8 +74,8 @@ def _count(axis: Axis, cells: int) -> tuple[float, float]:
 
 
 def cell_positions(axis: Axis, cells: int) -> tuple[Array, Array]:
-    """Points of all cells of one axis: as evaluation's coordinate and as positions in [-1, 1] on
-    the axis of nodes.
+    """Return points of all cells of one axis: as evaluation's coordinate and as positions in [-1,
+    1] on the axis of nodes.
 
     Along s, points below the block are never visited; cells that lie wholly below it repeat its
     edge.
@@ -91,8 +91,8 @@ def cell_positions(axis: Axis, cells: int) -> tuple[Array, Array]:
 
 
 def cells_1d(piece: int, values: Array, cells: int) -> Array:
-    """Power-basis coefficients (cells, WIDTH), highest power first, of a piece of v~crit with node
-    ``values`` (n,)."""
+    """Return power-basis coefficients (cells, WIDTH), highest power first, of a piece of v~crit
+    with node ``values`` (n,)."""
     x, positions = cell_positions(atlas.BORDER_PIECES[piece][1], cells)
     local = (
         interpolation_matrix(values.size, positions)
@@ -103,7 +103,8 @@ def cells_1d(piece: int, values: Array, cells: int) -> Array:
 
 
 def cell_scale(piece: int, x: Array) -> Array:
-    """Factor from node values to cell values of a piece of v~crit, at its coordinate ``x`` (n,)."""
+    """Return factor from node values to cell values of a piece of v~crit, at its coordinate ``x``
+    (n,)."""
     with np.errstate(divide="ignore", invalid="ignore"):  # both are infinite at y~ = infinity
         of_nodes, of_cells = kernels[-1].border_scales(
             piece, atlas.BORDER_PIECES[piece][1].amplitude(x)
@@ -112,8 +113,8 @@ def cell_scale(piece: int, x: Array) -> Array:
 
 
 def _to_powers(local: Array) -> Array:
-    """Power-basis coefficients, highest power first, of values (cells, WIDTH) at the points of each
-    cell."""
+    """Return power-basis coefficients, highest power first, of values (cells, WIDTH) at the points
+    of each cell."""
     # the mean apart: the change of basis multiplies rounding errors by a hundred
     mean = local.mean(axis=1)
     out: Array = np.ascontiguousarray((local - mean[:, None]) @ _TO_POWERS.T)
@@ -122,8 +123,8 @@ def _to_powers(local: Array) -> Array:
 
 
 def cells_2d(a: Axis, b: Axis, values: Array, cells: tuple[int, int]) -> Array:
-    """Power-basis coefficients (cells along a * cells along b, WIDTH, WIDTH) of node ``values``
-    (n_a, n_b).
+    """Return power-basis coefficients (cells along a * cells along b, WIDTH, WIDTH) of node
+    ``values`` (n_a, n_b).
 
     Axis 1 counts powers of the b coordinate, axis 2 powers of the a coordinate, both from 7 down to
     0.
@@ -141,8 +142,8 @@ def cells_2d(a: Axis, b: Axis, values: Array, cells: tuple[int, int]) -> Array:
 
 
 def _join_patches(patches: Sequence[Array]) -> Array:
-    """The patches (.., WIDTH, WIDTH) of all blocks as one array that starts on a cache line: a row
-    lies in one."""
+    """Return the patches (.., WIDTH, WIDTH) of all blocks as one array that starts on a cache line:
+    a row lies in one."""
     shape = (sum(p.shape[0] for p in patches), WIDTH, WIDTH)
     raw = np.empty(math.prod(shape) + WIDTH)
     skip = (-raw.ctypes.data % 64) // 8
@@ -150,7 +151,8 @@ def _join_patches(patches: Sequence[Array]) -> Array:
 
 
 def border_cells(pieces: Sequence[BorderPiece]) -> tuple[Array, Array]:
-    """The stored border for evaluation: coefficients (cells, WIDTH), and a row for each piece."""
+    """Return the stored border for evaluation: coefficients (cells, WIDTH), and a row for each
+    piece."""
     coefficients, rows, first = [], np.zeros(len(pieces), PIECE_ROW), 0
     rows["error"] = max(piece.max_rel_error for piece in pieces)
     for index, (row, piece) in enumerate(zip(rows, pieces, strict=True)):
@@ -162,7 +164,7 @@ def border_cells(pieces: Sequence[BorderPiece]) -> tuple[Array, Array]:
 
 
 def block_rows(contact: TabulatedContact) -> Array:
-    """The geometry of the blocks for evaluation: a row for each source, and one for none."""
+    """Return the geometry of the blocks for evaluation: a row for each source, and one for none."""
     rows, first = np.zeros(len(atlas.SOURCES) + 1, BLOCK_ROW), 0
     for row, chart, block in zip(rows, contact.charts, contact.blocks, strict=False):
         na, nb = block.cells
@@ -174,13 +176,13 @@ def block_rows(contact: TabulatedContact) -> Array:
 
 
 def _as_numbers(rows: NDArray[np.void]) -> Array:
-    """Rows with names as rows of doubles, for the kernel."""
+    """Return rows with names as rows of doubles, for the kernel."""
     return rows.view(np.float64).reshape(len(rows), -1)
 
 
 def quantity_cells(contact: TabulatedContact, code: int) -> tuple[Array, Array, Array]:
-    """A quantity for :meth:`mumacro.kernel.binding.Data.add_quantity`: polynomials, errors, errors
-    in every cell."""
+    """Return a quantity for :meth:`mumacro.kernel.binding.Data.add_quantity`: polynomials, errors,
+    errors in every cell."""
     name, errors = atlas.QUANTITY_NAMES[code], np.zeros((len(atlas.SOURCES) + 1, 2))
     patches, in_cells = [], []
     for error, chart, block in zip(errors, contact.charts, contact.blocks, strict=False):
@@ -201,8 +203,8 @@ def quantity_cells(contact: TabulatedContact, code: int) -> tuple[Array, Array, 
 
 @functools.cache
 def outer_cells() -> Array:
-    """Coefficients (cells, 2, WIDTH) of f and g + r f'/2 of the limit of large speed, in cells of
-    ln (1 + r^2)."""
+    """Return coefficients (cells, 2, WIDTH) of f and g + r f'/2 of the limit of large speed, in
+    cells of ln (1 + r^2)."""
     kernel = kernels[-1]
     cells, top = kernel.atlas.outer_cells, kernel.atlas.outer_log_max
     r = np.sqrt(np.expm1((np.arange(cells)[:, None] + 0.5 + 0.5 * LOCAL) * top / cells))
@@ -225,6 +227,6 @@ class Border:
         self._data = Data(*self.arrays, no_blocks, outer_cells())
 
     def __call__(self, y: Array) -> Array:
-        """v~crit [-] at ``y`` (n,) [-]: 0 at 0, infinite at infinity, NaN below 0 and for
+        """Return v~crit [-] at ``y`` (n,) [-]: 0 at 0, infinite at infinity, NaN below 0 and for
         NaN."""
         return kernels[-1].border(self._data, np.ascontiguousarray(y).reshape(-1)).reshape(y.shape)
