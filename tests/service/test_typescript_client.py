@@ -44,6 +44,7 @@ type Body<P extends keyof paths> = paths[P] extends {
   post: {requestBody: {content: {"application/json": infer B}}};
 } ? B : never;
 const CASE = {mu0: 0.3, Fz: "10 N", k: "1 N/um", y0: "2um", f: 20e3, v0: 0.01};
+const IN_SI = {mu0: 0.3, Fz: 10, k: 1e6, y0: 2e-6, f: 20e3, v0: 0.01};
 %s
 const client = createClient<paths>({baseUrl: process.argv[2] ?? ""});
 const one = await client.POST("/v1/mu-macro", {body: {...CASE, include: ["power", "inputs"]}});
@@ -57,9 +58,9 @@ const refused = await client.POST("/v1/mu-macro", {body: {...CASE, mu0: -0.3}});
 if (refused.error === undefined) throw new Error("a negative coefficient is answered");
 const field: string | undefined = refused.error.errors?.[0]?.field;
 const columns = await client.POST("/v1/mu-macro/batch", {
-  body: {...CASE, v0: [0, 0.01], omega: null},
+  body: {...IN_SI, v0: [0, 0.01], omega: null},
 });
-const BALL = {...CASE, contact: "ball" as const};
+const BALL = {...IN_SI, contact: "ball" as const};
 const rows = await client.POST("/v1/mu-macro/batch", {body: [BALL, {...BALL, v0: 0}]});
 console.log(JSON.stringify([mu, saved, k, rigid.data?.mu_macro, field, columns.data, rows.data]));
 """
