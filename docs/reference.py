@@ -2,6 +2,7 @@
 
     python docs/reference.py            # writes docs/command-help.md, http-fields.md, python.md and
                                         # the lists of scripts in decisions.md
+    python docs/reference.py --check    # names those that are not what they would be now
 
 They are text, so that they read alike on the site and in the repository; a test compares them with
 the program.
@@ -440,5 +441,9 @@ def pages() -> dict[str, str]:
 
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
-    for name, text in pages().items():
-        (DOCS / name).write_text(text, encoding="utf-8")
+    made = pages()
+    old = [name for name, text in made.items() if (DOCS / name).read_text("utf-8") != text]
+    if "--check" in sys.argv:
+        raise SystemExit(f"make again: {', '.join(old)}" if old else 0)
+    for name in old:
+        (DOCS / name).write_text(made[name], encoding="utf-8")

@@ -56,7 +56,7 @@ def cases() -> Iterator[tuple[str, dict[str, Any]]]:
 def test_no_case_of_the_documents_is_doubted() -> None:
     count = 0
     for page, case in cases():
-        columns = {
+        values: dict[str, Any] = {
             name: [read(name, one).si for one in value]
             if isinstance(value, (list, tuple))
             else read(name, value).si
@@ -64,7 +64,7 @@ def test_no_case_of_the_documents_is_doubted() -> None:
             if name in INPUTS and value not in (None, "")
         }
         columns = {
-            name: np.asarray(x, float) for name, x in columns.items() if not name.startswith("k_")
+            name: np.asarray(x, float) for name, x in values.items() if not name.startswith("k_")
         }
         if "f" in columns:
             columns["omega"] = 2.0 * np.pi * columns.pop("f")

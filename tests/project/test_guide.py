@@ -122,7 +122,7 @@ ELSEWHERE = {
     ),
     "gcc -O2 -c mumacro.c mumacro_table.c && gfortran mumacro.f90 friction.f90 mumacro.o "
     "mumacro_table.o -lm": ("tests/builder/export/test_c_languages.py", '"mumacro.f90"'),
-    "python docs/reference.py": ("tests/project/test_documents.py", "reference.pages()"),
+    "python docs/reference.py": ("tests/project/test_documents.py", "reference.py"),
     "mkoctfile --mex": (
         "tests/builder/export/test_c_languages.py",
         "test_octave_has_the_same_answers",

@@ -298,7 +298,7 @@ static void ask_nonsense(const mumacro_kernel *kernel) {
         cells->cell_errors = held[n++] = nonsense(3 * (size_t)cells->cells);
     }
     data.driven.nodes = (int)(drawn() * 40.0);
-    data.driven.points = held[n++] = nonsense(5 * (size_t)data.driven.nodes + 1);
+    data.driven.points = held[n++] = nonsense(MU_DRIVEN_COLUMNS * (size_t)data.driven.nodes + 1);
     ask_all(kernel, &data, 61, ordinary, -1);
     ask_all(kernel, &data, 19, any, -1);
     while (n) free(held[--n]);
