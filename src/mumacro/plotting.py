@@ -26,6 +26,7 @@ from mumacro.inputs.fields import RAD_PER_CYCLE, unit_of
 from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.units import suited
 from mumacro.kernel.arrays import Array
+from mumacro.results import Unit, tidy_zeros
 
 ENDINGS = (".png", ".svg", ".pdf")
 #: the map: v~ from deep in creep to fast sliding [-], and y~ [-]; that of a normal force is below
@@ -202,9 +203,9 @@ def quantity_words(name: str, value: Any) -> str:
 
 def _with_unit(si: str, *values: float) -> str:
     """Return numbers in an SI unit, in the one that suits the last of them."""
-    unit, scale = suited(si, values[-1])
-    numbers = " to ".join(f"{scale.of_si(value):.4g}" for value in values)
-    unit_text = unit.replace("um", "µm").replace("uN", "µN").removeprefix("-")
+    unit = Unit.suiting(si, values[-1])
+    numbers = " to ".join(tidy_zeros(unit.shown(value, 4)) for value in values)
+    unit_text = unit.name.replace("um", "µm").replace("uN", "µN").removeprefix("-")
     return f"{numbers} {unit_text}".rstrip()
 
 

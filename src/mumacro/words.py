@@ -6,10 +6,10 @@ from typing import Any
 from mumacro.answer import Answer
 from mumacro.inputs.fields import LIKE, PER_UNIT
 from mumacro.inputs.kind import Kind
-from mumacro.inputs.units import Scale, scale_of, suited
+from mumacro.inputs.units import suited
 from mumacro.notes import Note
 from mumacro.outputs import MEMBERS
-from mumacro.results import Rows, known, tidy_zeros
+from mumacro.results import Rows, Unit, known, tidy_zeros
 from mumacro.validity import notes_of
 
 REGIMES = {
@@ -60,33 +60,10 @@ def in_words(note: Note, kind: Kind, case: Mapping[str, Any]) -> Note:
 _UNIT_OF = {"limits.v0_crit": "v0", "groups.l0": "y0"}
 
 
-def with_unit(
-    value: float,
-    unit: str,
-    count: int,
-    shown: int | None = None,
-    error: float = 0.0,
-    typed: tuple[str, Scale] | None = None,
-) -> tuple[str, str]:
-    """Return a number in an SI unit with ``count`` digits, and the unit that was ``typed``, or
-    suits it; with ``shown`` that many digits, in SI.
-
-    >>> with_unit(2.4547623e-6, "m", 4), with_unit(2.4547623e-6, "m", 4, 8)
-    (('2.455', 'um'), ('2.4547623e-06', 'm'))
-    """
-    if shown is not None:
-        return f"{value:.{shown}g}", unit
-    name, scale = typed or suited(unit, value)
-    return known(scale.of_si(value), count, scale.of_si(error)), name
-
-
 def _stiffness(k: float, shown: int | None, units: Mapping[str, str]) -> str:
     """Return a stiffness that was given, or the middle of an interval."""
-    typed = None
-    if "k" in units and (scale := scale_of("k", units["k"])) is not None:
-        typed = units["k"], scale
-    number, unit = with_unit(k, "N/m", 6, shown, typed=typed)
-    return f"{tidy_zeros(number)} {unit}"
+    unit = Unit.of("k", k, units, shown)
+    return f"{tidy_zeros(unit.shown(k, 6, shown))} {unit.name}"
 
 
 def _rows_of(
@@ -100,11 +77,6 @@ def _rows_of(
         if shown is not None:
             return f"{value:#.{shown}g}"
         return known(value, count, error, deviation)
-
-    def typed(path: str) -> tuple[str, Scale] | None:
-        name = _UNIT_OF.get(path, "")
-        scale = scale_of(name, units[name]) if name in units else None
-        return None if scale is None else (units[name], scale)
 
     error, mu0 = answer.error_bound, cases.columns["mu0"]
     groups = "Fz_amplitude / Fz" if kind.normal else "y0 k / (mu0 Fz)"
@@ -138,6 +110,12 @@ def _rows_of(
             continue
         name, dot, member = path.partition(".")
         error = answer.outputs.get(f"{name}_bound{dot}{member}", 0.0)
-        text, unit = with_unit(value, MEMBERS[path].unit, count, shown, error, typed(path))
-        rows.append((path, text, f"[{unit}]", MEMBERS[path].meaning))
+        typed = _UNIT_OF.get(path, "")
+        in_unit = (
+            Unit.of(typed, value, units, shown)
+            if typed in units
+            else Unit.suiting(MEMBERS[path].unit, value, shown)
+        )
+        text = in_unit.shown(value, count, shown, error)
+        rows.append((path, text, f"[{in_unit.name}]", MEMBERS[path].meaning))
     return rows

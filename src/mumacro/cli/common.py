@@ -14,7 +14,7 @@ from argparse import RawDescriptionHelpFormatter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -28,11 +28,11 @@ from mumacro.inputs.layout import SEPARATORS, Dialect
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.numbers import check_signs
 from mumacro.inputs.signs import THOUSANDS
-from mumacro.inputs.units import Scale, belongs_to_value, scale_of, suited
+from mumacro.inputs.units import belongs_to_value
 from mumacro.notes import Note
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import names_in
-from mumacro.results import known, tidy_zeros
+from mumacro.results import Unit, tidy_zeros
 from mumacro.surrogate import Surrogate
 
 ABOUT_INPUTS = f"""\
@@ -421,35 +421,6 @@ def units_in(words: Sequence[str], **more: Sequence[str]) -> dict[str, str]:
         if name in INPUTS and (unit := read(name, text).unit) not in (None, "", "1", "-"):
             units.setdefault(name, str(unit))
     return units
-
-
-class Unit(NamedTuple):
-    """The unit in which an answer is printed."""
-
-    name: str
-    scale: Scale
-
-    @classmethod
-    def of(cls, name: str, value: float, units: Mapping[str, str], digits: int | None) -> "Unit":
-        """Return that of an input: the one that was typed, or the one that suits a value [SI]; with
-        ``--digits`` the SI unit."""
-        if digits is not None:
-            return cls(unit_of(name), Scale())
-        if name in units:
-            scale = scale_of(name, units[name])
-            return cls(units[name], Scale() if scale is None else scale)
-        return cls(*suited(unit_of(name), value))
-
-    def head(self, name: str) -> str:
-        """Return the head of a column."""
-        return f"{name} [{self.name}]"
-
-    def shown(self, value: float, count: int, digits: int | None, error: float = 0.0) -> str:
-        """Return a value [SI] with ``count`` digits, those that its ``error`` leaves; or with
-        ``--digits``."""
-        if digits is not None:
-            return f"{value:.{digits}g}"
-        return known(self.scale.of_si(value), count, self.scale.of_si(error))
 
 
 def case_line(case: Mapping[str, Any], units: Mapping[str, str], kind: Kind, *more: str) -> str:

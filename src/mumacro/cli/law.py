@@ -8,7 +8,6 @@ from mumacro.cli import common
 from mumacro.cli.common import (
     CURVE,
     OneLineParser,
-    Unit,
     UsageError,
     as_json,
     in_columns,
@@ -18,7 +17,7 @@ from mumacro.cli.common import (
 from mumacro.inputs.case import read_one
 from mumacro.inputs.fields import unit_of
 from mumacro.questions.law import law as friction_law
-from mumacro.results import known, tidy_zeros
+from mumacro.results import Unit, known, tidy_zeros
 
 EXAMPLE = 'mumacro law "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz" --along v0 0.1mm/s 1m/s'
 

@@ -12,7 +12,7 @@ from mumacro.inputs.kind import CONTACTS
 from mumacro.inputs.oscillation import read_oscillation
 from mumacro.motions.motion import NUMBERS, PARTS, Motion
 from mumacro.motions.motion import motion as steady_cycle
-from mumacro.words import with_unit
+from mumacro.results import Unit
 
 EXAMPLE = 'mumacro motion "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=1cm/s" --x 1um@90deg --y 2um'
 _INPUTS = f"""\
@@ -96,5 +96,5 @@ def _shown(
     if name == "power_drive" and motion.mu_macro:  # mu_macro Fz v0
         share[name] = abs(value / motion.mu_macro)
     error = motion.error_estimate * share.get(name, 0.0)
-    text, unit = with_unit(value, unit, 6, digits, error)
-    return text, f"[{unit}]"
+    shown = Unit.suiting(unit, value, digits)
+    return shown.shown(value, 6, digits, error), f"[{shown.name}]"

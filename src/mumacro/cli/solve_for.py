@@ -9,7 +9,6 @@ from mumacro.cli import common, motion, solve_motion
 from mumacro.cli.common import (
     ImpossibleError,
     OneLineParser,
-    Unit,
     UsageError,
     as_json,
     in_columns,
@@ -23,7 +22,7 @@ from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.names import suggestion
 from mumacro.motions.solve_motion import UNKNOWNS
 from mumacro.questions.solve_for import Root, TableSolution, solve_for
-from mumacro.results import tidy_zeros
+from mumacro.results import Unit, tidy_zeros
 
 EXAMPLE = 'mumacro solve-for y0 "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s" --target 0.15'
 _TARGET = ": give mu_macro, such as 0.15 or 15%, or with --ratio mu_macro/mu0"

@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mumacro.cli import common
-from mumacro.cli.common import ImpossibleError, Unit, UsageError, as_json, in_columns, read_case
+from mumacro.cli.common import ImpossibleError, UsageError, as_json, in_columns, read_case
 from mumacro.inputs.case import read
 from mumacro.inputs.kind import kind_of
 from mumacro.inputs.oscillation import read_oscillation
-from mumacro.inputs.units import Scale, scale_in, suited
+from mumacro.inputs.units import Scale, scale_in
 from mumacro.motions.motion import PARTS
 from mumacro.motions.solve_motion import MotionSolution, solve_motion
 from mumacro.questions.solutions import quantity_of_unknown
-from mumacro.results import known, tidy_zeros
+from mumacro.results import Unit, known, tidy_zeros
 
 EXAMPLE = 'mumacro solve-for v0 "mu0=0.3 Fz=10N k=0.1N/um f=50Hz" --x 0.1mm --normal 8N@-90deg'
 
@@ -91,7 +91,7 @@ def _unit_of(solution: MotionSolution, typed: Sequence[str], digits: int | None)
         scale = None if name is None else scale_in(quantity, name)
         if name is not None and scale is not None:
             return Unit(name, scale)
-    return Unit(*suited(unit, first.value))
+    return Unit.suiting(unit, first.value)
 
 
 def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: MotionSolution) -> str:
