@@ -221,7 +221,7 @@ class Connection(HttpToolsProtocol):
         return upgrades and self.parser.get_method() != b"CONNECT"
 
     def _read_without_upgrade(self, rest: bytes) -> None:
-        """Read the head again, without what asks for an upgrade, and then the body: this parser
+        """Read the header again, without what asks for an upgrade, and then the body: this parser
         reads none behind an upgrade."""
         start = b"%b %b HTTP/%b" % (
             self.parser.get_method(),

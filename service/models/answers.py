@@ -424,7 +424,7 @@ class PointsAnswer(BaseModel):
     )
     read_as: str = Field(
         description="How the table was read; empty for plain CSV",
-        examples=["tab, decimal comma, head in line 3, units in line 4"],
+        examples=["tab, decimal comma, header in line 3, units in line 4"],
     )
     api_version: str
 

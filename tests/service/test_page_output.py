@@ -551,7 +551,7 @@ def test_a_file_of_an_instrument_is_dropped(
     page.wait_for("#points-read", "9 points")
     page.settle()
     assert "run 1.txt" in page.text("#file-name")
-    assert "head in line 4" in page.text("#points-read")
+    assert "header in line 4" in page.text("#points-read")
     assert "skipped" in page.text("#points-read")
     page.click("#fit-button")
     assert re.search(r"k = 1.30* N/µm", page.texts("#fit-lines li")[0])

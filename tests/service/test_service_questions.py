@@ -333,7 +333,9 @@ def test_pasted_points_are_read_without_a_fit(client: Any) -> None:
     assert answer["columns"] == {"v0": [1.5, 2.5], "mu_macro": [7.0, 9.0]}
     assert answer["units"] == {"v0": "mm/s", "mu_macro": "%"}
     assert (answer["lines"], answer["skipped_lines"]) == ([5, 7], [1, 6])
-    assert answer["read_as"].startswith("tab, decimal comma, head in line 3, units in line 4; v0 [")
+    assert answer["read_as"].startswith(
+        "tab, decimal comma, header in line 3, units in line 4; v0 ["
+    )
     fitted = answered(
         client, "fit", {**RIG, "points": "v0 [mm/s];mu0;mu_macro\n1;0,31;0,069\n5;0,31;0,174\n"}
     )

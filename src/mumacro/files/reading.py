@@ -183,7 +183,7 @@ class TextSource:
                 raise FilesError(f"{path}: its header differs from that of {files[0]}")
             if to_text and table.signs.decimal not in ("", self.decimal):
                 raise FilesError(
-                    f"{path}: its decimal sign differs from that of {files[0]}; give the "
+                    f"{path}: its decimal separator differs from that of {files[0]}; give the "
                     "files one by one, or write Parquet"
                 )
         # Excel reads the signs of UTF-8 where it begins with a mark

@@ -126,14 +126,14 @@ class Layout(NamedTuple):
         >>> lines = ["run 7", "v0;mu_macro", "mm/s;%", "1,5;7"]
         >>> layout = find_layout(lines, column_names, Dialect())
         >>> layout.described(Signs(",", None))
-        'semicolon, decimal comma, head in line 2, units in line 3; v0 [mm/s], mu_macro [%]'
+        'semicolon, decimal comma, header in line 2, units in line 3; v0 [mm/s], mu_macro [%]'
         """
         is_utf8 = self.encoding in ("", "utf-8", "utf-8-sig")
         words = [] if is_utf8 else [NAMES.get(self.encoding, self.encoding)]
         words += [_WORDS.get(self.sep, repr(self.sep))]
         words += ["decimal comma"] if signs.decimal == "," else []
         words += [f"{_WORDS_OF_SIGNS[signs.grouped]} between thousands"] if signs.grouped else []
-        words += [f"head in line {self.head}"] if self.head > 1 else []
+        words += [f"header in line {self.head}"] if self.head > 1 else []
         places = ", ".join(map(str, self.units))
         words += [f"units in line{'s' * (len(self.units) > 1)} {places}"] if self.units else []
         words += [f"rows {self.first}..{self.last}"] if self.last else []
@@ -417,7 +417,7 @@ class _Units:
                 raise TextError(f"line {line}: {unit[:40]!r} is no unit of {name}")
             before, where = self._units.get(i, (unit, None))
             if scale_of(self.like[name], before) not in (scale, None):
-                says = "its head says" if where is None else f"line {where + 1} says"
+                says = "its header says" if where is None else f"line {where + 1} says"
                 raise TextError(
                     f"line {line}: {name} is in {unit}, {says} {before}; leave one of them out"
                 )
@@ -577,7 +577,7 @@ def is_row_of_units(
     if any(texts[len(names) :]):
         if not units:
             return False
-        raise TextError(f"line {number}: has {len(cells)} units, the head has {len(names)} names")
+        raise TextError(f"line {number}: has {len(cells)} units, the header has {len(names)} names")
     for i in places:
         if scales[i] is None:
             what = f"{texts[i][:40]!r} is neither a number nor a unit of {names[i]}"

@@ -126,7 +126,7 @@ class Signs:
         for sign, name in ((".", "point"), (",", "comma")):
             if sign in text and sign not in (self.decimal, self.thousands) and ".." not in text:
                 raise ValueError(
-                    f"has a {name}, which is neither the decimal sign nor between thousands"
+                    f"has a {name}, which is neither the decimal separator nor between thousands"
                 )
 
     def with_points(self, text: str) -> str:

@@ -2,7 +2,7 @@
 
 Every line of a table is accounted for: it is before the head, the head, units, data, a comment or
 empty (:mod:`mumacro.inputs.layout` finds how it is written).  What cannot be is refused by its
-line: another head, another segment, a row of statistics.  :class:`TextTable` gives the rows in
+line: another header, another segment, a row of statistics.  :class:`TextTable` gives the rows in
 pieces, whatever the length of the file; :func:`read_table` reads a table into memory.
 """
 
@@ -274,7 +274,7 @@ class Account:
         return True
 
     def _repeats_head(self, line: int, text: str) -> bool:
-        """Return whether a line is the head again; TextError where it is another one."""
+        """Return whether a line is the header again; TextError where it is another one."""
         layout, like = self.layout, self._column_names.like
         if text.startswith(END_OF_HEADER):
             raise TextError(f"line {line} begins another segment: {layout.without(line)}")
@@ -295,7 +295,7 @@ class Account:
         if names[: len(self._names)] == self._names and alike:
             return True
         raise TextError(
-            f"line {line} is another head, with other names or units: {layout.without(line)}"
+            f"line {line} is another header, with other names or units: {layout.without(line)}"
         )
 
     def _has_units(self, line: int, text: str) -> bool:
@@ -322,7 +322,8 @@ class Account:
         for name, unit in legend(text, [*self.layout.inputs.values()]):
             if scale_of(like[name], unit) != (self._units[name] or SI_UNIT):
                 raise TextError(
-                    f"line {line}: {name} is in {unit}, but not in the head: leave one of them out"
+                    f"line {line}: {name} is in {unit}, but not in the header: "
+                    "leave one of them out"
                 )
         self._has_units(line, text)
 
@@ -396,7 +397,7 @@ def _doubtful(
     account: Account, data: bytes, bare: bytes, starts: Places, ends: Places
 ) -> list[int]:
     """Return the rows that are looked at one by one: those that do not begin as numbers do, have
-    not as many cells as the head, or may be the head again."""
+    not as many cells as the head, or may be the header again."""
     if not ends.size:
         return []
     signs = np.frombuffer(data, np.uint8)
@@ -409,7 +410,7 @@ def _doubtful(
         is_doubtful |= _MAY_BE_OTHERWISE[_begin_of(starts, signs)]
         first = np.minimum(seps[np.minimum(before + place, seps.size) - 1] + 1, signs.size - 1)
     is_doubtful |= ~_BEGINS_NUMBER[_begin_of(first, signs)]
-    # the row of units below the head again may begin like a number
+    # the row of units below the header again may begin like a number
     is_doubtful[0] |= bool(account.repeated)
     place = data.find(name := account.name.encode())
     while place >= 0:
@@ -423,7 +424,7 @@ def _doubtful(
 def irregular(count: int, width: int) -> str:
     """Return what is wrong with a row of so many cells."""
     cells = "cell" if count == 1 else "cells"
-    return f"has {count:,} {cells}, the head has {width:,}"
+    return f"has {count:,} {cells}, the header has {width:,}"
 
 
 def _begin_of(cells: Places, signs: NDArray[np.uint8]) -> NDArray[np.uint16]:
@@ -486,7 +487,7 @@ def _no_number(like: str, text: str, fault: str, signs: Signs) -> str:
     except ValueError:
         return "must be a number"
     if is_unit(unit) or scale_of(like, unit) is not None:
-        return f"must be a number alone: write its unit into the head, as in {like} [{unit}]"
+        return f"must be a number alone: write its unit into the header, as in {like} [{unit}]"
     return "must be a number"
 
 
@@ -673,7 +674,7 @@ def read_table(
     >>> table.columns["mu_macro"].tolist(), table.skipped
     ([0.07, 0.09], [1])
     >>> table.read_as
-    'tab, decimal comma, head in line 3, units in line 4; v0 [mm/s], mu_macro [%]'
+    'tab, decimal comma, header in line 3, units in line 4; v0 [mm/s], mu_macro [%]'
     """
     table = TextTable(source, column_names, dialect, most.check)
     layout, signs = table.layout, table.signs
@@ -724,13 +725,13 @@ def again(lines: list[int]) -> str:
     """Return what is said of lines that have the head or its units again.
 
     >>> again([7]), again([])
-    ('; the head again in line 7, left out', '')
+    ('; the header again in line 7, left out', '')
     """
     if not lines:
         return ""
     more = f" and {len(lines) - 5:,} more" if len(lines) > 5 else ""
     places = ", ".join(map(str, lines[:5])) + more
-    return f"; the head again in line{'s' * (len(lines) > 1)} {places}, left out"
+    return f"; the header again in line{'s' * (len(lines) > 1)} {places}, left out"
 
 
 def read_columns(

@@ -234,8 +234,8 @@ def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(
         (3, "mu0", "must be finite and > 0"),
         (4, "mu0", "must be a number"),
         (5, "v0", "is missing"),
-        (6, "", "has 5 cells, the head has 6"),
-        (7, "", "has 7 cells, the head has 6"),
+        (6, "", "has 5 cells, the header has 6"),
+        (7, "", "has 7 cells, the header has 6"),
         (8, "k", MISSING_K),
         (12, "k", MISSING_K),
         (13, "k", "is too large, above 1.8e308"),
@@ -432,7 +432,7 @@ def test_files_know_contact_and_ends_of_k(
 
 
 def said(inputs: Any, head: str, key: str, unit: str) -> Any:
-    """The same table, whose field of v0 has another head and says a unit."""
+    """The same table, whose field of v0 has another header and says a unit."""
     fields = [
         field.with_name(head).with_metadata({key: unit}) if field.name == "v0" else field
         for field in inputs.schema

@@ -158,7 +158,7 @@ def test_files_that_differ_in_their_dialect_alone_are_one(tmp_path: Path) -> Non
     evaluate_files(files, tmp_path / "out.csv", TABLE)
     assert friction(tmp_path / "out.csv") == close([*MU, *MU], rel=1e-12)
     (tmp_path / "b.csv").write_text(f"{HEAD}\n{ROWS}".replace(",", ";").replace(".", ","))
-    with pytest.raises(FilesError, match="decimal sign"):
+    with pytest.raises(FilesError, match="decimal separator"):
         evaluate_files(files, tmp_path / "o.csv", TABLE)
     evaluate_files(files, tmp_path / "o.parquet", TABLE)
     (tmp_path / "b.csv").write_text(f"{HEAD} [mm/s]\n{ROWS}")
@@ -178,14 +178,14 @@ def test_files_that_differ_in_their_dialect_alone_are_one(tmp_path: Path) -> Non
             .replace("0.01", "1"),
             ("line 2: k '1.000'", "1 or 1000"),
         ),
-        (f"a\n{HEAD}\n{ROWS}v0,f,y0,k,Fz,mu0\n{ROWS}", ("line 5 is another head",)),
+        (f"a\n{HEAD}\n{ROWS}v0,f,y0,k,Fz,mu0\n{ROWS}", ("line 5 is another header",)),
         (f"{HEAD}\nm,N,N/m,m,Hz,m/s\n{ROWS}", ("line 2", "mu0")),
         (f"{HEAD}\n{ROWS}\0\0", ("line 4 has a zero byte",)),
         (f"{HEAD}\n" + "1," * (9 * 2**20), ("line 2 has more than 16 MiB",)),
         (f"{HEAD}\n{ROWS}" + "1" * (17 * 2**20), ("line 4 has more than 16 MiB",)),
         ("{}", ("it is JSON",)),
     ],
-    ids=["ambiguous", "another head", "no unit", "zero", "wide", "long", "json"],
+    ids=["ambiguous", "another header", "no unit", "zero", "wide", "long", "json"],
 )
 @pytest.mark.parametrize("end", ["csv", "parquet"])
 def test_what_is_refused_leaves_nothing(
@@ -236,7 +236,7 @@ HOSTILE: dict[str, tuple[Callable[[], bytes], str]] = {
     ),
     "two tables": (
         lambda: TABLE_BYTES + TABLE_BYTES.replace(b"v0", b"v0 [mm/s]"),
-        "line 4 is another head",
+        "line 4 is another header",
     ),
 }
 
@@ -320,7 +320,7 @@ def test_the_first_sheet_of_a_workbook_is_read(tmp_path: Path, workbook: Path) -
     evaluate_files([workbook], tmp_path / "out.csv", TABLE, say=said.append)
     assert friction(tmp_path / "out.csv") == close(MU, rel=1e-12)
     assert [row["day"] for row in rows_of(tmp_path / "out.csv")] == ["Monday"] * 2
-    assert "head in line 3, units in line 4" in said[0]
+    assert "header in line 3, units in line 4" in said[0]
 
 
 def sheets(path: Path, **rows_of: Any) -> Path:
@@ -360,8 +360,8 @@ def test_the_sheet_that_has_the_names_is_taken_and_the_others_are_named(tmp_path
 @pytest.mark.parametrize(
     ("cell", "form", "reason"),
     [
-        (2.0, '0.0 "um"', "write its unit into the head, as in y0 [um]"),
-        (2.0, "0.0\\ \\u\\m", "write its unit into the head, as in y0 [um]"),
+        (2.0, '0.0 "um"', "write its unit into the header, as in y0 [um]"),
+        (2.0, "0.0\\ \\u\\m", "write its unit into the header, as in y0 [um]"),
         ("=A2*2", "General", "is a formula without a value"),
     ],
 )
@@ -392,7 +392,7 @@ def test_options_count_for_workbooks(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("more", "line", "part"),
     [
-        (HEAD.replace("v0", "v0 [mm/s]"), 4, "another head"),
+        (HEAD.replace("v0", "v0 [mm/s]"), 4, "another header"),
         ("Mean,10,1e6,2e-6,20000,0.01", 4, "statistics"),
         ("Segment 2", 4, "neither a row nor a comment"),
         ("-,N,N/m,m,Hz,mm/s", 4, "v0 is in mm/s"),

@@ -49,7 +49,7 @@ def test_a_row_that_is_commented_out_is_no_row() -> None:
 
 def test_a_cell_beyond_the_head_is_not_dropped() -> None:
     assert table_of(f"v0,mu_macro\n1,0.069, ,\n{TWO}").columns["v0"].tolist() == [1.0, 2.0]
-    with pytest.raises(TextError, match="line 3 has 3 cells, the head has 2"):
+    with pytest.raises(TextError, match="line 3 has 3 cells, the header has 2"):
         table_of(f"v0,mu_macro\n{ONE}2,0.097,7\n")
 
 

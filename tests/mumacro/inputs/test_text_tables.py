@@ -34,23 +34,23 @@ V0 = [1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2]
 MU = [0.069, 0.097, 0.174, 0.221, 0.247, 0.274, 0.289, 0.305]
 #: made after descriptions of what rigs and programs write, each with how it is read
 RIGS = {
-    "amplifier.asc": "Windows-1252, tab, decimal comma, head in line 9",
-    "excel_de.csv": "semicolon, decimal comma, point between thousands, head in line 2",
-    "finite_elements.txt": "blanks, head in line 6",
-    "labview.lvm": "tab, decimal comma, head in line 23, units in line 18",
+    "amplifier.asc": "Windows-1252, tab, decimal comma, header in line 9",
+    "excel_de.csv": "semicolon, decimal comma, point between thousands, header in line 2",
+    "finite_elements.txt": "blanks, header in line 6",
+    "labview.lvm": "tab, decimal comma, header in line 23, units in line 18",
     "oscilloscope.csv": "comma, units in line 2",
-    "preamble.csv": "comma, head in line 8",
-    "rheometer.txt": "tab, head in line 10, units in line 11",
-    "rheometer_utf16.csv": "UTF-16, tab, decimal comma, head in line 6, units in line 8",
-    "savetxt.dat": "blanks, head in line 2",
-    "testing_machine.csv": "comma, head in line 7, units in line 8",
+    "preamble.csv": "comma, header in line 8",
+    "rheometer.txt": "tab, header in line 10, units in line 11",
+    "rheometer_utf16.csv": "UTF-16, tab, decimal comma, header in line 6, units in line 8",
+    "savetxt.dat": "blanks, header in line 2",
+    "testing_machine.csv": "comma, header in line 7, units in line 8",
     "windows_1252.csv": "Windows-1252, semicolon, decimal comma",
-    "astronomers.ecsv": "blanks, head in line 9, units in line 4",
-    "controller_recorder.csv": "comma, head in line 4, units in line 3",
-    "data_logger.csv": "comma, head in line 7",
-    "hydraulic.txt": "blanks, head in line 5, units in line 4",
+    "astronomers.ecsv": "blanks, header in line 9, units in line 4",
+    "controller_recorder.csv": "comma, header in line 4, units in line 3",
+    "data_logger.csv": "comma, header in line 7",
+    "hydraulic.txt": "blanks, header in line 5, units in line 4",
     "joined.csv": "comma",
-    "pruefstand_legende.csv": "Windows-1252, semicolon, decimal comma, head in line 4, units in "
+    "pruefstand_legende.csv": "Windows-1252, semicolon, decimal comma, header in line 4, units in "
     "line 2",
     "simulator.csv": "comma",
     "statistics_r.csv": "comma",
@@ -96,7 +96,7 @@ def test_what_rigs_write_is_read_and_said(rigs: Path, name: str) -> None:
     [
         ("ambiguous.txt", 2, ("'1.000'", "may be 1 or 1000", "--decimal .", "--decimal ,")),
         ("recorder.csv", 6, ("neither a row nor a comment",)),
-        ("two_steps.csv", 8, ("another head", "--rows 4..7")),
+        ("two_steps.csv", 8, ("another header", "--rows 4..7")),
         ("catalogue.dat", 1, ("v0", "mu_macro")),
         ("plc_scope.csv", 13, ("'EOF'", "--rows 5..12")),
         ("rheometer_steps.txt", 11, ("'[step]'", "--rows 6..10")),
@@ -362,7 +362,7 @@ def test_a_deviation_or_an_interval_is_no_point() -> None:
 @pytest.mark.parametrize("cell", ["5 um/s", "5um/s", "2,5 mm/s", "3 N"])
 def test_a_unit_in_a_cell_is_refused_with_its_place(cell: str) -> None:
     fault = str(refused(f"v0;mu_macro\n{cell};0,2\n1,5;0,3\n"))
-    assert fault.startswith("line 2: v0 must be a number alone: write its unit into the head")
+    assert fault.startswith("line 2: v0 must be a number alone: write its unit into the header")
 
 
 # --- units ----------------------------------------------------------------------------------------
@@ -418,7 +418,7 @@ def test_units_stand_beside_the_names_or_in_a_legend(text: str) -> None:
         ("# Sliding speed [mm/s]\nv0,mu_macro\n" + TWO, 1, "v0 [mm/s]"),
         ("v0,mu_macro\nmm/s,-,N\n" + TWO, 2, "3 units"),
         ("mm/s,-\nv0,mu_macro\nm/s,-\n" + TWO, 3, "line 1 says mm/s"),
-        (f"v0,mu_macro\n{TWO}# v0: speed [mm/s]\n", 4, "not in the head"),
+        (f"v0,mu_macro\n{TWO}# v0: speed [mm/s]\n", 4, "not in the header"),
     ],
 )
 def test_units_that_cannot_be_assigned_are_refused(text: str, line: int, part: str) -> None:
@@ -463,7 +463,7 @@ def test_a_first_segment_with_a_longer_row_of_units_is_not_lost() -> None:
 def test_the_same_head_again_is_left_out_and_said(head: str) -> None:
     table = read(head + TWO + head + TWO)
     assert table.columns["v0"].tolist() == close([*IN_MM, *IN_MM], rel=1e-15)
-    assert "the head again in line" in table.read_as
+    assert "the header again in line" in table.read_as
     assert len(table.skipped) == head.count("\n")
 
 
