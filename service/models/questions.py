@@ -336,8 +336,8 @@ class FitRequest(Choice):
         described("Fz_amplitude", ": for direction normal in place of y0")
     )
     points: str | None = optional(
-        "The points as a table: its header is the first line that names v0 and mu_macro, units stand "
-        "in brackets or in the line below",
+        "The points as a table: its header is the first line that names v0 and mu_macro, units "
+        "stand in brackets or in the line below",
         examples=["v0 [mm/s]\tmu_macro\n1\t0.069\n5\t0.174\n20\t0.247\n100\t0.289\n"],
     )
     points_base64: str | None = optional("The bytes of the file of a table, in base64")
