@@ -12,7 +12,7 @@ import timeit
 import numpy as np
 
 from mumacro import Surrogate
-from mumacro.inputs.kind import Kind
+from mumacro.inputs.fields import Kind
 from mumacro.kernel import threads as slices
 
 TOLERANCES = (1e-4, 1e-7, 1e-10, 1e-12)

@@ -36,7 +36,7 @@ from builder.solver.steady import border, continuous, solve, workspace
 from builder.solver.stick import stick_excess
 from builder.solver.sweep import Sweep
 from mumacro import Surrogate, closed_forms
-from mumacro.inputs.kind import BALL, SPRING, Kind
+from mumacro.inputs.fields import BALL, SPRING, Kind
 from mumacro.plotting import Panels, save
 from mumacro.table import atlas
 from mumacro.table.polynomials import chebyshev_coefficients, interpolation_matrix, nodes

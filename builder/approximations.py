@@ -8,7 +8,7 @@ import numpy as np
 
 from mumacro import closed_forms
 from mumacro.errors import InputError
-from mumacro.inputs.kind import SPRING
+from mumacro.inputs.fields import SPRING
 from mumacro.kernel.arrays import Array
 from mumacro.questions.law import Law
 from mumacro.surrogate import Surrogate

@@ -27,8 +27,7 @@ from builder.tables.contacts import FINE, SolvedContact, ball, scale_of, spring
 from builder.tables.draws import DRAWS
 from builder.tables.verify import Neighbours, bound_over_error
 from mumacro import Surrogate
-from mumacro.inputs.fields import FIELDS
-from mumacro.inputs.kind import BALL, SPRING, Kind
+from mumacro.inputs.fields import BALL, FIELDS, SPRING, Kind
 from mumacro.kernel.binding import CaseRows, kernels
 from mumacro.table.atlas import CONTINUOUS, QUANTITIES, QUANTITY_NAMES, REGIME_OF_SOURCE
 from tests.support import extended

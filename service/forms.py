@@ -16,8 +16,7 @@ from pydantic import ValidationError
 from mumacro.answer import TEXTS, Answer, nested
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, named
-from mumacro.inputs.fields import ENDS, FIELDS, field_of
-from mumacro.inputs.kind import AMPLITUDE, DIRECTIONS, SPRING, kind_of
+from mumacro.inputs.fields import AMPLITUDE, DIRECTIONS, ENDS, FIELDS, SPRING, field_of, kind_of
 from mumacro.stopping import look
 
 from .json_text import NotRead, count, decode_batch, decode_columns, decode_rows, dump

@@ -13,8 +13,7 @@ import numpy as np
 from mumacro import plotting
 from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.errors import InputError
-from mumacro.inputs.fields import INPUTS, LIKE
-from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRINGS_OF, kind_of
+from mumacro.inputs.fields import AMPLITUDE, CONTACTS, DIRECTIONS, INPUTS, LIKE, SPRINGS_OF, kind_of
 from mumacro.inputs.units import UNITS_OF, Scale
 from mumacro.outputs import OUTPUTS
 from mumacro.stiffness import MATERIALS, SOURCE_OF_MATERIALS

@@ -26,9 +26,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.inputs.case import no_number
-from mumacro.inputs.fields import BOUNDS, ENDS, LIKE, RIGID, STIFFNESS, refusal
+from mumacro.inputs.fields import AMPLITUDE, BOUNDS, ENDS, LIKE, RIGID, STIFFNESS, refusal
 from mumacro.inputs.fields import NAMES as INPUTS
-from mumacro.inputs.kind import AMPLITUDE
 from mumacro.inputs.names import unknown_name
 from mumacro.motions.motion import PARTS
 

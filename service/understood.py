@@ -8,9 +8,9 @@ from mumacro.contacts.geometries import ARGUMENTS
 from mumacro.errors import InputError
 from mumacro.inputs.case import read
 from mumacro.inputs.fields import INPUTS, QUANTITY_OF, RIGID
-from mumacro.inputs.oscillation import read_oscillation
 from mumacro.inputs.units import QUANTITIES
 from mumacro.motions.motion import PARTS
+from mumacro.motions.oscillation import read_oscillation
 
 UNDERSTOOD = "inputs"  # the name in include
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from mumacro import Surrogate
-from mumacro.inputs.kind import BALL, CONTACTS, SPRING, SPRINGS_OF, Kind
+from mumacro.inputs.fields import BALL, CONTACTS, SPRING, SPRINGS_OF, Kind
 from mumacro.kernel.arrays import Array, Codes
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import Surrogate
-from mumacro.inputs.kind import SPRING, Kind
+from mumacro.inputs.fields import SPRING, Kind
 from mumacro.kernel.arrays import Array
 from mumacro.table.atlas import (
     CONTINUOUS,

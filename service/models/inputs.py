@@ -23,8 +23,16 @@ from pydantic import (
 from mumacro.errors import InputError
 from mumacro.inputs.case import no_number, reason_of
 from mumacro.inputs.cases import DEVIATIONS, EXACT, one_word
-from mumacro.inputs.fields import BOUNDS, MOST_HZ, POSITIVE, RIGID, described, refusal
-from mumacro.inputs.kind import ContactName, DirectionName
+from mumacro.inputs.fields import (
+    BOUNDS,
+    MOST_HZ,
+    POSITIVE,
+    RIGID,
+    ContactName,
+    DirectionName,
+    described,
+    refusal,
+)
 from mumacro.kernel.arrays import Array
 
 from .values import (

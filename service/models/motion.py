@@ -18,10 +18,9 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from mumacro.errors import InputError
 from mumacro.inputs.case import read_one, reason_of
-from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF, described
-from mumacro.inputs.kind import ContactName
-from mumacro.inputs.oscillation import MOST_HARMONIC, WHOLE, read_oscillation
+from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF, ContactName, described
 from mumacro.motions.motion import TOLERANCES
+from mumacro.motions.oscillation import MOST_HARMONIC, WHOLE, read_oscillation
 
 from .answers import REMARKS, Number, Numbers, Remark, Understood, quantity, understood_inputs
 from .inputs import EXAMPLE, ONE_FREQUENCY, Strict, either, optional

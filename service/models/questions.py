@@ -20,10 +20,9 @@ from pydantic_core import InitErrorDetails
 from mumacro.contacts.geometries import GEOMETRIES
 from mumacro.errors import InputError
 from mumacro.inputs.case import no_number, read_one, reason_of
-from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF, STIFFNESS, described
-from mumacro.inputs.kind import AMPLITUDE
+from mumacro.inputs.fields import AMPLITUDE, MOST_HZ, QUANTITY_OF, STIFFNESS, described
 from mumacro.inputs.layout import SEPARATORS, Dialect
-from mumacro.inputs.signs import THOUSANDS
+from mumacro.inputs.numbers import THOUSANDS
 from mumacro.motions.motion import PARTS
 from mumacro.motions.solve_motion import UNKNOWNS
 

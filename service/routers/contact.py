@@ -9,9 +9,8 @@ from fastapi import Request, Response
 
 import mumacro
 from mumacro.contacts.geometries import contact_of
-from mumacro.errors import InputError
+from mumacro.errors import InputError, TextError
 from mumacro.fits.measured_points import read_points, unknowns_beside
-from mumacro.inputs.decoding import TextError
 from mumacro.inputs.text_tables import Most, Table
 from mumacro.inputs.workbooks import BEGIN as WORKBOOK
 

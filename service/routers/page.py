@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fastapi import APIRouter, HTTPException, Request, Response
 
-from mumacro.inputs.kind import SPRING, kind_of
+from mumacro.inputs.fields import SPRING, kind_of
 
 from .. import __version__
 from ..admission import compute

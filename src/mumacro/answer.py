@@ -9,8 +9,7 @@ import numpy as np
 from mumacro import plotting
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.doubts import remarks as doubts
-from mumacro.inputs.fields import RAD_PER_CYCLE
-from mumacro.inputs.kind import AMPLITUDE, Kind
+from mumacro.inputs.fields import AMPLITUDE, RAD_PER_CYCLE, Kind
 from mumacro.notes import Note
 from mumacro.results import Result, Rows, cell
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES

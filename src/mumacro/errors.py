@@ -1,9 +1,11 @@
 """The exceptions of the project, independent of HTTP; and what to install where a package is
 missing."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+_FAULTS_SHOWN = 5  # that one line of a message names
 _OURS = ("mumacro", "builder", "service")
 
 
@@ -28,6 +30,20 @@ class InputError(MumacroError, ValueError):
         """Rebuild from the parts: an error that a worker process raises must reach the calling
         process."""
         return type(self), (self.field, self.value, self.bound, self.index)
+
+
+class TextError(MumacroError, ValueError):
+    """A table as text cannot be read: one line that says what, where, and the remedy."""
+
+    faults: Sequence[str] = ()  #: one for each line, where there are several
+
+    @classmethod
+    def of(cls, faults: Sequence[str]) -> "TextError":
+        """Return an error that tells the first faults."""
+        rest = f"; and {len(faults) - _FAULTS_SHOWN:,} more" if len(faults) > _FAULTS_SHOWN else ""
+        error = cls("; ".join(faults[:_FAULTS_SHOWN]) + rest)
+        error.faults = faults
+        return error
 
 
 class TableError(MumacroError):

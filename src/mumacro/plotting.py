@@ -22,8 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro.errors import InputError, MumacroError, missing
-from mumacro.inputs.fields import RAD_PER_CYCLE, unit_of
-from mumacro.inputs.kind import AMPLITUDE
+from mumacro.inputs.fields import AMPLITUDE, RAD_PER_CYCLE, unit_of
 from mumacro.inputs.units import suited
 from mumacro.kernel.arrays import Array
 from mumacro.results import Unit, tidy_zeros

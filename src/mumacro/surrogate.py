@@ -26,9 +26,19 @@ from mumacro.inputs.cases import (
     no_such_input,
 )
 from mumacro.inputs.columns import is_column, read_column
-from mumacro.inputs.fields import FIELDS, RAD_PER_CYCLE
-from mumacro.inputs.kind import BALL, SPRING, Kind, kind_of
-from mumacro.inputs.signature import AnyCases, ManyCases, Numbers, OneCase, OneInterval
+from mumacro.inputs.fields import (
+    BALL,
+    FIELDS,
+    RAD_PER_CYCLE,
+    SPRING,
+    AnyCases,
+    Kind,
+    ManyCases,
+    Numbers,
+    OneCase,
+    OneInterval,
+    kind_of,
+)
 from mumacro.kernel.arrays import Array, common_shape, flat
 from mumacro.kernel.threads import default_threads
 from mumacro.outputs import evaluation

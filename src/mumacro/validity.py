@@ -16,8 +16,7 @@ from mumacro.answer import BAND, Answer
 from mumacro.contacts.stiffening import ROUGH, Stiffening
 from mumacro.errors import InputError
 from mumacro.inputs.doubts import FURTHEST, UNITS
-from mumacro.inputs.fields import RAD_PER_CYCLE, RIGID
-from mumacro.inputs.kind import AMPLITUDE, SPRINGS_OF, Kind, kind_of
+from mumacro.inputs.fields import AMPLITUDE, RAD_PER_CYCLE, RIGID, SPRINGS_OF, Kind, kind_of
 from mumacro.inputs.numbers import plain
 from mumacro.notes import ASSUMES, Note, Row
 from mumacro.outputs.settling import REMAINING, decay_of_springs

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mumacro.answer import Answer
-from mumacro.inputs.fields import LIKE, PER_UNIT
-from mumacro.inputs.kind import Kind
+from mumacro.inputs.fields import LIKE, PER_UNIT, Kind
 from mumacro.inputs.units import suited
 from mumacro.notes import Note
 from mumacro.outputs import MEMBERS
@@ -45,7 +44,7 @@ def in_words(note: Note, kind: Kind, case: Mapping[str, Any]) -> Note:
     """Return a note on a case in the words of its contact, a ball is not one spring, and with what
     is typed in place of an advice.
 
-    >>> from mumacro.inputs.kind import kind_of
+    >>> from mumacro.inputs.fields import kind_of
     >>> in_words(Note("assumes", "...", "one spring"), kind_of("ball"), {"k": 1.0}).row
     'a ball'
     """

@@ -10,7 +10,7 @@ import pytest
 import mumacro
 from mumacro import Surrogate, plotting
 from mumacro.fits.fitted import Fit
-from mumacro.inputs.kind import KINDS, Kind
+from mumacro.inputs.fields import KINDS, Kind
 from mumacro.questions.law import Law
 from tests.support.cases import Case
 from tests.support.comparing import close

@@ -11,7 +11,7 @@ import numpy as np
 from mumacro.inputs.case import read
 from mumacro.inputs.doubts import UNITS, remarks
 from mumacro.inputs.fields import INPUTS
-from mumacro.inputs.oscillation import read_oscillation
+from mumacro.motions.oscillation import read_oscillation
 from tests.support.documents import PAGES
 from tests.support.places import ROOT
 

@@ -17,7 +17,7 @@ from starlette.testclient import TestClient
 
 from mumacro import Surrogate, plotting
 from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
-from mumacro.inputs.kind import CONTACTS, DIRECTIONS
+from mumacro.inputs.fields import CONTACTS, DIRECTIONS
 from mumacro.inputs.units import UNITS_OF
 from service.app import create_app
 from service.settings import Settings

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mumacro import Surrogate
-from mumacro.inputs.kind import kind_of
+from mumacro.inputs.fields import kind_of
 
 Array = NDArray[np.float64]
 Case = dict[str, Any]  # inputs by name

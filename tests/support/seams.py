@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from builder.tables.contacts import SolvedContact, scale_of
 from builder.tables.verify import BESIDE_BORDER, Neighbours
 from mumacro import Surrogate
-from mumacro.inputs.kind import BALL, CONTACTS, Kind
+from mumacro.inputs.fields import BALL, CONTACTS, Kind
 from mumacro.kernel.binding import BLOCK_ROW, PIECE_ROW, kernels
 from mumacro.table.atlas import (
     BORDER_PIECES,

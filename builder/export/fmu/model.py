@@ -5,9 +5,10 @@ Inputs are mu0, Fz, k, y0, omega, v0 and Fz_amplitude; outputs mu_macro, mu_rati
 friction force along v0 that is regularised below the parameter v_rest, with directional derivatives
 by all inputs; beside them error_bound, v_tilde, y_tilde, regime and source.  v0 may be negative:
 all but the force are those of its absolute value.  The parameters contact and direction are
-enumerations, in the order of :data:`mumacro.inputs.kind.CONTACTS` and ``DIRECTIONS``; Fz_amplitude
-counts for direction normal alone, y0 for the others.  Model Exchange and Co-Simulation.  An illegal
-input makes a simulator's call return "discard", with the reason in its log.
+enumerations, in the order of :data:`mumacro.inputs.fields.CONTACTS` and ``DIRECTIONS``;
+Fz_amplitude counts for direction normal alone, y0 for the others.  Model Exchange and
+Co-Simulation.  An illegal input makes a simulator's call return "discard", with the reason in its
+log.
 
 The unit holds its sources, the binary of the machine it is made on, and where zig is installed
 those of Linux and Windows for 64-bit Intel and AMD; without any compiler the sources alone.
@@ -25,8 +26,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from mumacro.inputs.fields import INPUTS, unit_of
-from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS
+from mumacro.inputs.fields import AMPLITUDE, CONTACTS, DIRECTIONS, INPUTS, unit_of
 from mumacro.table import atlas
 from mumacro.table.blocks import Table
 from mumacro.version import __version__

@@ -22,12 +22,22 @@ from mumacro import plotting
 from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.case import NO_DEVIATION, read, read_one
 from mumacro.inputs.cases import A_DEVIATION, EXACT, KIND, check, without_interval
-from mumacro.inputs.fields import ENDS, INPUTS, RAD_PER_CYCLE, in_help, unit_of
-from mumacro.inputs.kind import AMPLITUDE, CONTACTS, DIRECTIONS, SPRING, Kind, kind_of
+from mumacro.inputs.fields import (
+    AMPLITUDE,
+    CONTACTS,
+    DIRECTIONS,
+    ENDS,
+    INPUTS,
+    RAD_PER_CYCLE,
+    SPRING,
+    Kind,
+    in_help,
+    kind_of,
+    unit_of,
+)
 from mumacro.inputs.layout import SEPARATORS, Dialect
 from mumacro.inputs.names import suggestion
-from mumacro.inputs.numbers import check_signs
-from mumacro.inputs.signs import THOUSANDS
+from mumacro.inputs.numbers import THOUSANDS, check_signs
 from mumacro.inputs.units import belongs_to_value
 from mumacro.notes import Note
 from mumacro.outputs import OUTPUTS

@@ -18,13 +18,11 @@ from mumacro.cli.common import (
     in_columns,
     open_table,
 )
-from mumacro.errors import InputError
+from mumacro.errors import InputError, TextError
 from mumacro.fits.fit import fit
 from mumacro.fits.fitted import Fit
 from mumacro.fits.measured_points import STD, UNKNOWNS, read_points, unknowns_beside
-from mumacro.inputs.decoding import TextError
-from mumacro.inputs.fields import unit_of
-from mumacro.inputs.kind import AMPLITUDE
+from mumacro.inputs.fields import AMPLITUDE, unit_of
 from mumacro.surrogate import Surrogate
 from mumacro.validity import digits
 

@@ -9,12 +9,11 @@ from typing import Any
 from mumacro import plotting
 from mumacro.cli import common
 from mumacro.cli.common import ImpossibleError, OneLineParser, UsageError, as_json, in_columns
-from mumacro.errors import InputError
+from mumacro.errors import InputError, TextError
 from mumacro.fits.loop import fit_loop
 from mumacro.fits.loop_fitted import LoopFit
 from mumacro.inputs.case import read_one
-from mumacro.inputs.decoding import TextError
-from mumacro.inputs.kind import CONTACTS
+from mumacro.inputs.fields import CONTACTS
 from mumacro.inputs.layout import ColumnNames
 from mumacro.inputs.text_tables import read_table
 

@@ -7,11 +7,10 @@ from pathlib import Path
 from mumacro import plotting
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns, read_case
-from mumacro.inputs.fields import in_help
-from mumacro.inputs.kind import CONTACTS
-from mumacro.inputs.oscillation import read_oscillation
+from mumacro.inputs.fields import CONTACTS, in_help
 from mumacro.motions.motion import NUMBERS, PARTS, Motion
 from mumacro.motions.motion import motion as steady_cycle
+from mumacro.motions.oscillation import read_oscillation
 from mumacro.results import Unit
 
 EXAMPLE = 'mumacro motion "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=1cm/s" --x 1um@90deg --y 2um'

@@ -17,8 +17,7 @@ from mumacro.cli.common import (
     read_case,
 )
 from mumacro.inputs.case import read_one
-from mumacro.inputs.fields import ENDS, NAMES
-from mumacro.inputs.kind import AMPLITUDE
+from mumacro.inputs.fields import AMPLITUDE, ENDS, NAMES
 from mumacro.inputs.names import suggestion
 from mumacro.motions.solve_motion import UNKNOWNS
 from mumacro.questions.solve_for import Root, TableSolution, solve_for

@@ -8,10 +8,10 @@ from typing import Any
 from mumacro.cli import common
 from mumacro.cli.common import ImpossibleError, UsageError, as_json, in_columns, read_case
 from mumacro.inputs.case import read
-from mumacro.inputs.kind import kind_of
-from mumacro.inputs.oscillation import read_oscillation
+from mumacro.inputs.fields import kind_of
 from mumacro.inputs.units import Scale, scale_in
 from mumacro.motions.motion import PARTS
+from mumacro.motions.oscillation import read_oscillation
 from mumacro.motions.solve_motion import MotionSolution, solve_motion
 from mumacro.questions.solutions import quantity_of_unknown
 from mumacro.results import Unit, known, tidy_zeros

@@ -22,8 +22,7 @@ import numpy as np
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import check, real
-from mumacro.inputs.kind import kind_of
-from mumacro.inputs.signature import Numbers
+from mumacro.inputs.fields import Numbers, kind_of
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 

@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike
 from mumacro.errors import InputError
 from mumacro.inputs.case import read, read_one
 from mumacro.inputs.cases import check, real
-from mumacro.inputs.fields import ENDS
-from mumacro.inputs.kind import CONTACTS, SPRINGS_OF, Kind
+from mumacro.inputs.fields import CONTACTS, ENDS, SPRINGS_OF, Kind
 from mumacro.kernel.arrays import Array
 
 EXPONENT = "stiffness_exponent"

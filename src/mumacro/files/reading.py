@@ -15,11 +15,11 @@ import pyarrow.compute as pc
 import pyarrow.csv
 import pyarrow.dataset
 
+from mumacro.errors import TextError
 from mumacro.files.record_batch import FilesError
 from mumacro.inputs.carried import units_of_fields
-from mumacro.inputs.decoding import TextError
 from mumacro.inputs.layout import GAPS, ColumnNames, Dialect, Layout
-from mumacro.inputs.signs import Signs
+from mumacro.inputs.numbers import Signs
 from mumacro.inputs.text_tables import Rows, TextTable, joined
 from mumacro.kernel.arrays import Places
 

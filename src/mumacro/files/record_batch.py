@@ -16,12 +16,10 @@ from mumacro.answer import BAND, DEFAULT, TEXTS
 from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, other_amplitude
-from mumacro.inputs.fields import ENDS, GAP, LIKE, SI, refusal
-from mumacro.inputs.headings import absent, find_heads, meant_by
-from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
+from mumacro.inputs.fields import AMPLITUDE, ENDS, GAP, LIKE, SI, SPRING, Kind, kind_of, refusal
 from mumacro.inputs.layout import ColumnNames
-from mumacro.inputs.numbers import TOO_LARGE
-from mumacro.inputs.signs import Signs
+from mumacro.inputs.names import absent, find_heads, meant_by
+from mumacro.inputs.numbers import TOO_LARGE, Signs
 from mumacro.inputs.text_tables import numbers_of
 from mumacro.inputs.units import Scale, scale_of, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes

@@ -23,7 +23,7 @@ from mumacro.files.record_batch import (
 from mumacro.files.writing import Output, csv_lines, written_as
 from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import KIND
-from mumacro.inputs.kind import Kind, kind_of
+from mumacro.inputs.fields import Kind, kind_of
 from mumacro.inputs.layout import Dialect
 from mumacro.notes import Note, Remark, add
 from mumacro.surrogate import Surrogate

@@ -18,8 +18,7 @@ from mumacro.fits.loop_fitted import LoopFit
 from mumacro.fits.profile import Profile, quantile
 from mumacro.inputs.cases import real
 from mumacro.inputs.columns import to_si
-from mumacro.inputs.kind import kind_of
-from mumacro.inputs.signature import Numbers
+from mumacro.inputs.fields import Numbers, kind_of
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.kernel.binding import kernels
 from mumacro.notes import NOTE, Note

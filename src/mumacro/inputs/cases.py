@@ -27,24 +27,22 @@ from mumacro.inputs.columns import (
     to_si,
 )
 from mumacro.inputs.fields import (
+    AMPLITUDE,
+    AMPLITUDES,
     BOUNDS,
+    DIRECTIONS,
     ENDS,
     FIELDS,
     LIFTS_OFF,
     POSITIVE,
     RAD_PER_CYCLE,
+    SPRING,
     STIFFNESS,
     UNITS,
-    field_of,
-    refusal,
-)
-from mumacro.inputs.kind import (
-    AMPLITUDE,
-    AMPLITUDES,
-    DIRECTIONS,
-    SPRING,
     Kind,
+    field_of,
     kind_of,
+    refusal,
 )
 from mumacro.inputs.names import in_place_of, suggestion
 from mumacro.inputs.numbers import check_signs

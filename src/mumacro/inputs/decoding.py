@@ -11,15 +11,14 @@ import gzip
 import io
 import re
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mumacro.errors import MumacroError
+from mumacro.errors import TextError
 
 PIECE = 4 * 2**20  #: bytes that are read at once
 LONGEST = 16 * 2**20  #: characters of a line, at most
-_SHOWN = 5  # faults that one line of a message names
 _START = 1024  # bytes from which the encoding is decided
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -53,20 +52,6 @@ _ENCODING = re.compile(
 #: encodings as people call them
 NAMES = {"utf-8": "UTF-8", "utf-8-sig": "UTF-8", "utf-16": "UTF-16", "utf-32": "UTF-32"}
 NAMES |= {"utf-16-le": "UTF-16", "utf-16-be": "UTF-16", "cp1252": "Windows-1252"}
-
-
-class TextError(MumacroError, ValueError):
-    """A table as text cannot be read: one line that says what, where, and the remedy."""
-
-    faults: Sequence[str] = ()  #: one for each line, where there are several
-
-    @classmethod
-    def of(cls, faults: Sequence[str]) -> "TextError":
-        """Return an error that tells the first faults."""
-        more = f"; and {len(faults) - _SHOWN:,} more" if len(faults) > _SHOWN else ""
-        error = cls("; ".join(faults[:_SHOWN]) + more)
-        error.faults = faults
-        return error
 
 
 class Piece(NamedTuple):

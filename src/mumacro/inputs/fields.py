@@ -1,4 +1,5 @@
-"""The inputs of a case, one row each: name, symbol, unit, meaning, bound, usual range, example.
+"""The inputs of a case, one row each: name, symbol, unit, meaning, bound, usual range, example; the
+contact and the direction of the oscillation; and what functions take, for type checkers.
 
 The library, the files, the command line, the service, the page and the exports take the words for
 an input from here.  A frequency ``f`` [Hz] may be given in place of the angular frequency ``omega``
@@ -7,11 +8,23 @@ contact by the word ``rigid`` or by infinity.
 
 **A gap is never rigid**: a single None or NaN is refused, an empty cell, null or NaN in a column
 ``k`` makes its case illegal, see :data:`GAP`.
+
+One spring, shaken across, is the default.  ``contact="ball"`` is a sphere on a flat, Hertz under a
+constant load, as independent springs (method of dimensionality reduction): mu~(v~, y~) = (3/2)
+int_0^1 s mu~_spring(v~/(1.5 s), y~/(1.5 s)) d xi with s = 1 - xi^2 and l0 = mu0 Fz / k, where k = 8
+a G* is the stiffness before slip.  ``direction="along"`` shakes along the sliding direction,
+``"normal"`` the normal force, Fz + Fz_amplitude cos(omega t).  The formulas are in
+``kernel/contact.c`` and ``kernel/directions.c``; here are the names.
 """
 
 import math
 import sys
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Required, TypedDict, TypeVar
+
+from numpy.typing import ArrayLike
+
+from mumacro.errors import InputError
 
 RAD_PER_CYCLE = 2.0 * math.pi  # omega [rad/s] at f = 1 Hz
 RIGID = "rigid"  # the word for a stiffness without bound
@@ -186,3 +199,195 @@ def refusal(name: str, value: float) -> str:
     if name == "f":
         return f"must be {BOUNDS['omega']}, and so must be omega = 2 pi f"
     return f"must be {BOUNDS[name]}"
+
+
+# --- the contact and the direction of the oscillation ---------------------------------------------
+
+ContactName = Literal["spring", "ball"]
+DirectionName = Literal["across", "along", "normal"]
+#: in the order of the kernel's codes
+CONTACTS: tuple[ContactName, ...] = ("spring", "ball")
+DIRECTIONS: tuple[DirectionName, ...] = ("across", "along", "normal")
+
+
+class Springs(NamedTuple):
+    """What is known of a contact's springs without an evaluation."""
+
+    meaning: str
+    exponent: float  #: k grows with this power of the load
+    middle_load: float  #: load of the middle spring over the mean
+
+
+#: by contact
+SPRINGS_OF: dict[str, Springs] = {
+    "spring": Springs("one spring of stiffness k", 0.0, 1.0),
+    "ball": Springs("a ball (Hertz) with the initial stiffness k", 1.0 / 3.0, 1.5),
+}
+AMPLITUDE = "Fz_amplitude"  # of the normal force [N], in place of y0
+AMPLITUDES = ("y0", AMPLITUDE)
+# by code of the direction
+_FIELDS = (
+    FIELDS,
+    FIELDS,
+    tuple(AMPLITUDE if name == "y0" else name for name in FIELDS),
+)
+
+
+class Kind(NamedTuple):
+    """A contact and a direction by their codes in the kernel."""
+
+    contact: int
+    direction: int
+
+    @property
+    def normal(self) -> bool:
+        """Whether the normal force oscillates."""
+        return DIRECTIONS[self.direction] == "normal"
+
+    @property
+    def amplitude(self) -> str:
+        """The input that says how far it oscillates."""
+        return AMPLITUDES[self.normal]
+
+    @property
+    def other_amplitude(self) -> str:
+        """The input that says so for other directions."""
+        return AMPLITUDES[not self.normal]
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """The six inputs by name, :data:`mumacro.inputs.fields.FIELDS` with Fz_amplitude in place
+        of y0 for normal."""
+        return _FIELDS[self.direction]
+
+    @property
+    def names(self) -> dict[str, Any]:
+        """Both as the keywords of ``evaluate``."""
+        return {"contact": CONTACTS[self.contact], "direction": DIRECTIONS[self.direction]}
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of columns that a table of cases may have."""
+        return (*self.fields, "f")
+
+
+SPRING, BALL = Kind(0, 0), Kind(1, 0)  # across
+_KINDS: dict[tuple[str, str], Kind] = {
+    (contact, direction): Kind(i, j)
+    for j, direction in enumerate(DIRECTIONS)
+    for i, contact in enumerate(CONTACTS)
+}
+del _KINDS["ball", "normal"]
+#: all that there are
+KINDS = (*_KINDS.values(),)
+
+
+def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
+    """Return the codes of a contact and a direction; InputError for unknown names and a ball whose
+    normal force oscillates.
+
+    >>> kind_of("ball", "along")
+    Kind(contact=1, direction=1)
+    """
+    try:
+        return _KINDS[contact, direction]
+    except (KeyError, TypeError):
+        pass  # the reason follows
+    for name, value, names in (
+        ("contact", contact, CONTACTS),
+        ("direction", direction, DIRECTIONS),
+    ):
+        if not isinstance(value, str) or value not in names:
+            raise InputError(name, value, f"one of {', '.join(names)}")
+    bound = (
+        "across or along for a ball: a normal force that oscillates changes its contact "
+        "radius, not modelled"
+    )
+    raise InputError("direction", direction, bound)
+
+
+# --- what functions take, for type checkers and in their signatures -------------------------------
+
+if TYPE_CHECKING:
+    Numbers = ArrayLike
+    Oscillation = Any
+else:  # a signature shows the name, in place of a union of twenty lines
+
+    class Numbers:
+        """A number in SI, a text with a unit such as "2um", a quantity, or an array of numbers."""
+
+    class Oscillation:
+        """An amplitude, a text such as "2um@90deg", (amplitude, phase in degrees), or a list of
+        (harmonic, amplitude, phase): see :func:`mumacro.motion`."""
+
+
+_Value = float | str  # a text is read as a person types it
+_AnyValue = TypeVar("_AnyValue")
+
+
+class _Options(TypedDict, total=False):
+    include: Iterable[str]
+    illegal: Literal["nan", "raise"]
+
+
+class _Deviations(TypedDict, Generic[_AnyValue], total=False):
+    std_mu0: _AnyValue
+    std_Fz: _AnyValue
+    std_k: _AnyValue
+    std_y0: _AnyValue
+    std_Fz_amplitude: _AnyValue
+    std_omega: _AnyValue
+    std_f: _AnyValue
+    std_v0: _AnyValue
+
+
+class _One(_Deviations[_Value], _Options, total=False):
+    mu0: Required[_Value]
+    Fz: Required[_Value]
+    y0: _Value
+    Fz_amplitude: _Value
+    omega: _Value
+    f: _Value
+    v0: Required[_Value]
+    contact: ContactName
+    direction: DirectionName
+
+
+class OneCase(_One):
+    """One case."""
+
+    k: _Value
+
+
+class OneInterval(_One):
+    """One case whose k is an interval."""
+
+    k_low: Required[_Value]
+    k_high: Required[_Value]
+
+
+class _Inputs(_Deviations[_AnyValue], Generic[_AnyValue], total=False):
+    mu0: _AnyValue
+    Fz: _AnyValue
+    k: _AnyValue
+    k_low: _AnyValue
+    k_high: _AnyValue
+    y0: _AnyValue
+    Fz_amplitude: _AnyValue
+    omega: _AnyValue | None
+    f: _AnyValue | None
+    v0: _AnyValue
+    contact: _AnyValue
+    direction: _AnyValue
+
+
+class ManyCases(_Inputs[ArrayLike], _Options, total=False):
+    """Cases as arrays, or names that stand beside a mapping."""
+
+
+class AnyCases(_Inputs[Any], total=False):
+    """The same of any type, such as labelled arrays or quantities with units."""
+
+    include: Any
+    gradient: bool
+    illegal: str

@@ -11,10 +11,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import NamedTuple
 
-from mumacro.inputs.decoding import NAMES, TextError
+from mumacro.errors import TextError
+from mumacro.inputs.decoding import NAMES
 from mumacro.inputs.fields import is_rigid
-from mumacro.inputs.headings import find_heads, heading, meant_by, unit_in_si
-from mumacro.inputs.signs import Signs
+from mumacro.inputs.names import find_heads, heading, meant_by, unit_in_si
+from mumacro.inputs.numbers import Signs
 from mumacro.inputs.units import QUANTITIES, Scale, canonical, scale_of, split_unit
 
 BLANKS = " "  #: the separator where any number of blanks stands between the cells

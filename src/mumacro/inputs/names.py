@@ -1,11 +1,12 @@
-"""Names of inputs as people write them: which input a name probably stands for."""
+"""Names of inputs as people write them, alone or over a column with a unit: the input that a name
+stands for, its unit, and what to do about one that is unknown or missing."""
 
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
-from mumacro.inputs.fields import NAMES
-from mumacro.inputs.units import split_unit
+from mumacro.inputs.fields import INPUTS, NAMES, QUANTITY_OF
+from mumacro.inputs.units import QUANTITIES, Scale, bound_of_unit, canonical, scale_of, split_unit
 
 # Lower case, without spaces and punctuation.  Only names that hardly mean anything else, since a
 # file whose column has one of them while the input itself is missing is refused.
@@ -117,3 +118,186 @@ def unknown_name(name: str, allowed: Iterable[str]) -> str:
         nearest = next(iter(difflib.get_close_matches(name[:80], names, n=1, cutoff=0.6)), None)
     advice = f"did you mean {nearest}? " if nearest else ""
     return f"unknown field; {advice}allowed: {', '.join(names)}"
+
+
+# --- heads of columns -----------------------------------------------------------------------------
+
+# heads that a message lists, and that are compared with misspelt names
+_LISTED, _COMPARED = 20, 100
+# "k in N/mm", "k / (N/mm)", "k, N/mm": forms of standards for tables
+_WITH_UNIT = re.compile(r"(\w+)(?: ?/ ?| in |, ?)(\S.*)")
+
+
+def heading(cell: str, like: Mapping[str, str]) -> str:
+    """Return a head as it stands in a table, on one line, with its unit in brackets if it names one
+    of ``like``.
+
+    >>> heading("v0 / (mm/s)", {"v0": "v0"}), heading("run / day", {"v0": "v0"})
+    ('v0 [mm/s]', 'run / day')
+    """
+    text = " ".join(cell.split()) if "\n" in cell else cell.strip()
+    match = _WITH_UNIT.fullmatch(text)
+    if match and match[1] in like and text not in like:
+        unit = match[2].strip(" ()[]")
+        if scale_of(like[match[1]], unit) is not None:
+            return f"{match[1]} [{unit}]"
+    return text
+
+
+def find_heads(
+    heads: Sequence[str], like: Mapping[str, str]
+) -> tuple[dict[str, tuple[int, Scale]], list[str]]:
+    """Return the place and unit of each column by name, and the faults of the heads.
+
+    ``like`` has the names of the columns, and for each the input whose units it has; other columns
+    are left out.
+
+    >>> find_heads(["v0 [mm/s]", "note"], {"v0": "v0"})
+    ({'v0': (0, Scale(times=1.0, over=1000.0))}, [])
+    """
+    columns: dict[str, tuple[int, Scale]] = {}
+    faults = []
+    for i, head in enumerate(heads):
+        name, unit = split_unit(head)
+        if name not in like:
+            continue
+        scale = Scale() if unit is None else scale_of(like[name], unit)
+        if scale is None:
+            faults.append(f"the column {head!r} has a unit that {_no_unit(name, unit or '', like)}")
+        if name in columns:
+            faults.append(
+                f"{name} is there twice: {heads[columns[name][0]]!r} and {head!r}; rename one"
+            )
+        columns[name] = i, scale or Scale()
+    if {"f", "omega"} <= columns.keys():
+        faults.append("there are both f [Hz] and omega [rad/s]; leave one out")
+    return columns, faults
+
+
+def _no_unit(name: str, unit: str, like: Mapping[str, str]) -> str:
+    """Return why a unit of a column is refused, with the number to give where it is clear what is
+    meant.
+
+    >>> _no_unit("y0", "um pp", {"y0": "y0"})
+    'y0 cannot have: it must be half of peak to peak: give 0.5um in place of 1 um pp'
+    """
+    quantity = QUANTITY_OF[like[name]]
+    if name == "omega" and scale_of("f", unit):
+        return f"{name} cannot have: a frequency is f [Hz]; give {QUANTITIES[quantity].such_as}"
+    bound = bound_of_unit(quantity, 1.0, unit)
+    if bound == QUANTITIES[quantity].bound:
+        return f"{name} cannot have; give {QUANTITIES[quantity].such_as}"
+    return f"{name} cannot have: it must be {bound} in place of 1 {unit}"
+
+
+def meant_by(head: str, *, loosely: bool = True) -> str | None:
+    """Return the input that a head probably stands for, as a whole or by its first word: k for
+    ``k_N_per_mm``."""
+    name = split_unit(head)[0]
+    first = re.split(r"[\W_]+", name.strip("_ "))[0]
+    return suggestion(name, loosely=loosely) or suggestion(first, loosely=False)
+
+
+def absent(names: Sequence[str], heads: Sequence[str]) -> str:
+    """Return what to do about columns that are missing.
+
+    >>> absent(["v0"], ["speed", "mu_macro"])
+    "there is no column v0; 'speed' is similar: rename that column to v0 [m/s] (or another unit in
+    brackets)"
+    >>> absent(["Fz", "v0"], ["speed", "note"])
+    "there are no columns Fz [N], v0 [m/s]; there are 'speed', 'note'; similar: rename 'speed' to
+    v0 [m/s]"
+    """
+    alike = [one for name in names if (one := _similar(name, heads))]
+    if len(names) == 1 and alike:
+        head, column = alike[0]
+        remedy = f"rename that column to {column} (or another unit in brackets)"
+        return f"there is no column {names[0]}; {head!r} is similar: {remedy}"
+    what = "is no column" if len(names) == 1 else "are no columns"
+    renames = ", ".join(f"{head!r} to {column}" for head, column in alike)
+    remedy = f"; similar: rename {renames}" if alike else ""
+    return f"there {what} {', '.join(map(_heading, names))}; there are {_listed(heads)}{remedy}"
+
+
+def _listed(heads: Sequence[str]) -> str:
+    """Return the heads for a message of bounded length."""
+    text = ", ".join(
+        repr(head if len(head) <= 80 else f"{head[:77]}...") for head in heads[:_LISTED]
+    )
+    more = len(heads) - _LISTED
+    return f"{text} and {more:,} more" if more > 0 else text
+
+
+def _heading(name: str) -> str:
+    """Return the heading that a column of an input has, in SI units."""
+    heading = f"{name} [{unit_in_si(name)}]"
+    more = {"omega": " or f [Hz]", "mu_macro": " (the mean friction force over Fz)"}
+    return heading + more.get(name, "")
+
+
+def unit_in_si(name: str) -> str:
+    """Return the SI unit of a column.
+
+    >>> unit_in_si("k_low"), unit_in_si("mu_macro")
+    ('N/m', '-')
+    """
+    return INPUTS[name].unit if name in INPUTS else "-"
+
+
+def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
+    """Return the head that probably stands for an input, and the heading that it should have."""
+    for loosely, candidates in ((False, heads), (True, heads[:_COMPARED])):
+        for head in candidates:
+            if field := _stands_for(head, name, loosely):
+                column = f"{field} [{_unit_of(head, field) or unit_in_si(field)}]"
+                return head, column + (_HALVED if _is_whole(head, field) else "")
+    return None
+
+
+def _stands_for(head: str, name: str, loosely: bool) -> str | None:
+    """Return the input as which a head probably stands for a column that is missing: omega also as
+    f, and mu_macro as what people call friction.
+
+    >>> _stands_for("freq", "omega", False), _stands_for("COF", "mu_macro", False)
+    ('f', 'mu_macro')
+    """
+    field = meant_by(head, loosely=loosely)
+    if name == "mu_macro":
+        friction = field == "mu0" or "macro" in head.lower()
+        return name if friction and split_unit(head)[0] not in INPUTS else None
+    return field if field in (name, {"omega": "f"}.get(name)) else None
+
+
+_HALVED = ", with half of each value: it is peak to peak"
+_PEAK_TO_PEAK = re.compile(
+    r"p(?:ea)?k[\W_]*+(?:to|2)?+[\W_]*+p(?:ea)?k|(?<![a-z])p[\W_]?(?:to|2|t)?[\W_]?p(?![a-z])"
+    r"|double[\W_]amplitude",
+    re.IGNORECASE,
+)
+
+
+def _is_whole(head: str, field: str) -> bool:
+    """Return whether a head says that its column is twice the amplitude.
+
+    >>> _is_whole("Amplitude p-p [um]", "y0"), _is_whole("peak amplitude [um]", "y0")
+    (True, False)
+    """
+    return field in ("y0", "Fz_amplitude") and _PEAK_TO_PEAK.search(head[:80]) is not None
+
+
+def _unit_of(head: str, field: str) -> str | None:
+    """Return the unit that a head has in brackets, or as its last words.
+
+    >>> _unit_of("Amplitude [um]", "y0"), _unit_of("Amplitude µm", "y0"), _unit_of("speed", "v0")
+    ('um', 'µm', None)
+    >>> _unit_of("v0_um_s", "v0"), _unit_of("k_N_per_mm", "k")
+    ('um/s', 'N/mm')
+    """
+    unit = split_unit(head)[1]
+    if unit is not None:
+        return unit
+    words = re.sub(r"[\s_]+", " ", head[:80].strip()).split(" ")
+    for ratio in (" ".join(words[-3:]), "/".join(words[-2:])):
+        if len(words) > 2 and scale_of(field, ratio) is not None:
+            return canonical(ratio)
+    return words[-1] if words[-1] and scale_of(field, words[-1]) is not None else None

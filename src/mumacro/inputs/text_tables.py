@@ -18,9 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mumacro.inputs.decoding import LONGEST, Piece, Text, TextError, file_pieces
+from mumacro.errors import TextError
+from mumacro.inputs.decoding import LONGEST, Piece, Text, file_pieces
 from mumacro.inputs.fields import QUANTITY_OF, RIGID
-from mumacro.inputs.headings import absent, find_heads, heading, unit_in_si
 from mumacro.inputs.layout import (
     BLANKS,
     END_OF_HEADER,
@@ -41,8 +41,8 @@ from mumacro.inputs.layout import (
     uncommented,
     units_in,
 )
-from mumacro.inputs.numbers import TOO_LARGE, read_number, split_number, tidy
-from mumacro.inputs.signs import Cell, Signs
+from mumacro.inputs.names import absent, find_heads, heading, unit_in_si
+from mumacro.inputs.numbers import TOO_LARGE, Cell, Signs, read_number, split_number, tidy
 from mumacro.inputs.units import Scale, scale_of, split_unit
 from mumacro.inputs.workbooks import BEGIN, SEP, read_sheet
 from mumacro.kernel.arrays import Array, Places
@@ -110,7 +110,7 @@ class Most(NamedTuple):
 
         >>> Most(cell=3).check(Piece(7, "a,b\\na,abcd"))
         Traceback (most recent call last):
-        mumacro.inputs.decoding.TextError: line 8: a cell may have up to 3 characters
+        mumacro.errors.TextError: line 8: a cell may have up to 3 characters
         """
         for number, line in enumerate(piece.lines, piece.first):
             if len(line) > self.cell and max(map(len, _BETWEEN.split(line))) > self.cell:

@@ -14,9 +14,8 @@ from itertools import islice, repeat
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mumacro.errors import missing
-from mumacro.inputs.decoding import TextError
-from mumacro.inputs.signs import evidence
+from mumacro.errors import TextError, missing
+from mumacro.inputs.numbers import evidence
 
 # other zip files, by what their first member or the list of their members begins with
 _OPEN_DOCUMENT = b"mimetypeapplication/vnd.oasis.opendocument"

@@ -336,7 +336,7 @@ class Kernel:
         """Evaluate a part of n cases: fill ``answers`` there.
 
         ``columns`` are the six inputs, (n,) or one number.  ``kind``: another contact and
-        direction, see :class:`mumacro.inputs.kind.Kind`.
+        direction, see :class:`mumacro.inputs.fields.Kind`.
         """
         start, n = part.start, part.stop - part.start
         numbers, codes = answers.numbers, answers.source

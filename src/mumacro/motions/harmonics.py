@@ -10,9 +10,9 @@ import numpy as np
 from mumacro.errors import InputError
 from mumacro.inputs.carried import carried_unit
 from mumacro.inputs.columns import to_si
-from mumacro.inputs.oscillation import MOST_HARMONIC
-from mumacro.inputs.signature import Numbers
+from mumacro.inputs.fields import Numbers
 from mumacro.kernel.arrays import Array
+from mumacro.motions.oscillation import MOST_HARMONIC
 from mumacro.notes import NOTE, Note, texts_of
 from mumacro.results import Result
 

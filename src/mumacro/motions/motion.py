@@ -18,13 +18,11 @@ from mumacro import plotting
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ABSENT, columns_of, real
 from mumacro.inputs.doubts import remarks_on_motion
-from mumacro.inputs.fields import BOUNDS, RAD_PER_CYCLE, STIFFNESS
-from mumacro.inputs.kind import kind_of
-from mumacro.inputs.oscillation import read_oscillation
-from mumacro.inputs.signature import Numbers, Oscillation
+from mumacro.inputs.fields import BOUNDS, RAD_PER_CYCLE, STIFFNESS, Numbers, Oscillation, kind_of
 from mumacro.kernel.arrays import Array, Bools, common_shape, flat
 from mumacro.kernel.binding import kernels
 from mumacro.kernel.threads import default_threads
+from mumacro.motions.oscillation import read_oscillation
 from mumacro.notes import WARNING, Note
 from mumacro.results import Result, Rows, cell
 from mumacro.stopping import current, look

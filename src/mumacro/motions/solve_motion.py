@@ -16,12 +16,11 @@ from mumacro.errors import InputError
 from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import real
 from mumacro.inputs.columns import to_si
-from mumacro.inputs.fields import RAD_PER_CYCLE, unit_of
+from mumacro.inputs.fields import RAD_PER_CYCLE, Numbers, unit_of
 from mumacro.inputs.names import unknown_name
-from mumacro.inputs.oscillation import read_oscillation
-from mumacro.inputs.signature import Numbers
 from mumacro.kernel.arrays import Array
 from mumacro.motions.motion import PARTS, motion
+from mumacro.motions.oscillation import read_oscillation
 from mumacro.questions.search import Found, Search
 from mumacro.questions.solutions import Reach, Solution, quantity_of_unknown, unit_of_unknown
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from mumacro.inputs.kind import AMPLITUDE
+from mumacro.inputs.fields import AMPLITUDE
 from mumacro.outputs.evaluated import Evaluated
 
 Values = dict[str, Any]  # by path: one number, or (n,)

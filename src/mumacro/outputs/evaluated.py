@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mumacro.inputs.cases import Cases
-from mumacro.inputs.kind import AMPLITUDE
+from mumacro.inputs.fields import AMPLITUDE
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import Detail
 from mumacro.outputs.tabulated import Tabulated

@@ -10,7 +10,7 @@ import numpy as np
 from mumacro.answer import BAND, GROUPS, Answer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases
-from mumacro.inputs.kind import BALL, Kind
+from mumacro.inputs.fields import BALL, Kind
 from mumacro.kernel.binding import Detail
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.deviation import STD, bent

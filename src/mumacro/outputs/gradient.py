@@ -4,8 +4,7 @@ import math
 from typing import Any
 
 from mumacro.inputs.cases import ALL_FIELDS
-from mumacro.inputs.fields import PER_UNIT
-from mumacro.inputs.kind import AMPLITUDE
+from mumacro.inputs.fields import AMPLITUDE, PER_UNIT
 from mumacro.outputs.entry import Member, Output, Values
 from mumacro.outputs.evaluated import Evaluated, where
 

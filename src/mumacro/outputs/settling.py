@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mumacro.inputs.kind import CONTACTS, SPRING, SPRINGS_OF
+from mumacro.inputs.fields import CONTACTS, SPRING, SPRINGS_OF
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 from mumacro.outputs.entry import Member, Output, Values

@@ -16,7 +16,7 @@ from mumacro import closed_forms
 from mumacro.contacts.quadrature import prepare_driven
 from mumacro.errors import TableError
 from mumacro.inputs.cases import Cases
-from mumacro.inputs.kind import CONTACTS, SPRING, Kind
+from mumacro.inputs.fields import CONTACTS, SPRING, Kind
 from mumacro.kernel import threads as slices
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.kernel.binding import CaseRows, Data, Detail, ExtremeRows, SlopeRows, kernels

@@ -10,7 +10,7 @@ import numpy as np
 
 from mumacro.contacts.stiffening import Stiffening
 from mumacro.inputs.cases import fixed_inputs
-from mumacro.inputs.kind import kind_of
+from mumacro.inputs.fields import kind_of
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.questions.input_curve import EVERYWHERE, InputCurve
 from mumacro.questions.search import TINY, last_double

@@ -9,7 +9,7 @@ import numpy as np
 from mumacro.answer import Answer
 from mumacro.contacts.stiffening import Stiffening
 from mumacro.inputs.cases import Cases
-from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind
+from mumacro.inputs.fields import AMPLITUDE, SPRING, Kind
 from mumacro.kernel.arrays import Array
 from mumacro.outputs.gradient import GRADIENT
 from mumacro.surrogate import Surrogate

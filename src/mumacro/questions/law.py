@@ -15,8 +15,18 @@ from mumacro.errors import InputError
 from mumacro.inputs.case import read, read_one
 from mumacro.inputs.cases import DEVIATIONS, Cases, fixed_inputs, named, without_interval
 from mumacro.inputs.columns import is_column, to_si
-from mumacro.inputs.fields import ENDS, NAMES, POSITIVE, QUANTITY_OF, field_of, unit_of
-from mumacro.inputs.kind import AMPLITUDE, SPRING, Kind, kind_of
+from mumacro.inputs.fields import (
+    AMPLITUDE,
+    ENDS,
+    NAMES,
+    POSITIVE,
+    QUANTITY_OF,
+    SPRING,
+    Kind,
+    field_of,
+    kind_of,
+    unit_of,
+)
 from mumacro.kernel.arrays import Array
 from mumacro.notes import Note
 from mumacro.outputs.evaluation import chosen

@@ -41,9 +41,7 @@ from mumacro.contacts.stiffening import Stiffening, stiffening_of
 from mumacro.errors import InputError
 from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import fixed_inputs, real, without_interval
-from mumacro.inputs.fields import ENDS, POSITIVE, QUANTITY_OF, field_of
-from mumacro.inputs.kind import AMPLITUDE, kind_of
-from mumacro.inputs.signature import Numbers
+from mumacro.inputs.fields import AMPLITUDE, ENDS, POSITIVE, QUANTITY_OF, Numbers, field_of, kind_of
 from mumacro.kernel.arrays import Array
 from mumacro.notes import Note
 from mumacro.questions.input_curve import EVERYWHERE, InputCurve

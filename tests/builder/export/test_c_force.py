@@ -11,7 +11,7 @@ import pytest
 
 from builder.export.c import write_c
 from mumacro import Element, Surrogate
-from mumacro.inputs.kind import CONTACTS, DIRECTIONS
+from mumacro.inputs.fields import CONTACTS, DIRECTIONS
 from tests.support import compilers
 from tests.support.cases import Case, every_pair, tables
 from tests.support.comparing import close

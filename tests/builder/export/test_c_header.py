@@ -17,8 +17,7 @@ import pytest
 from builder.export.c import header_text, write_c
 from builder.tables.draws import DRAWS
 from mumacro import Surrogate
-from mumacro.inputs.fields import BOUNDS, FIELDS
-from mumacro.inputs.kind import CONTACTS, DIRECTIONS, kind_of
+from mumacro.inputs.fields import BOUNDS, CONTACTS, DIRECTIONS, FIELDS, kind_of
 from mumacro.kernel import binding
 from mumacro.kernel.binding import kernels
 from mumacro.table import atlas

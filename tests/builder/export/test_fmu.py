@@ -12,8 +12,7 @@ import pytest
 
 from builder.export.grid import export_table
 from mumacro import Surrogate
-from mumacro.inputs.fields import FIELDS
-from mumacro.inputs.kind import CONTACTS, DIRECTIONS
+from mumacro.inputs.fields import CONTACTS, DIRECTIONS, FIELDS
 from tests.support import compilers
 from tests.support.cases import CASE, PAIRS, as_kind, tables
 from tests.support.comparing import close

@@ -18,7 +18,7 @@ from builder.tables.draws import DRAWS
 from builder.tables.measure import block_errors
 from builder.tables.verify import Neighbours, seam_jumps
 from mumacro import Surrogate, closed_forms
-from mumacro.inputs.kind import BALL
+from mumacro.inputs.fields import BALL
 from mumacro.kernel.binding import kernels
 from mumacro.table import bundled
 from mumacro.table.atlas import CHARTS, MIDDLE, QUANTITY_NAMES, SLOW, STEEPEST, STEEPEST_Y

@@ -10,7 +10,7 @@ from builder.solver.sweep import Sweep
 from builder.tables.build import build_table
 from builder.tables.contacts import ball, slopes_of, spring
 from mumacro import Surrogate
-from mumacro.inputs.kind import BALL, SPRING, Kind
+from mumacro.inputs.fields import BALL, SPRING, Kind
 from mumacro.table.atlas import MIDDLE, QUANTITIES, QUANTITY_NAMES
 from tests.support.cases import opened
 from tests.support.nightly import nightly

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from mumacro import Surrogate
-from mumacro.inputs.kind import kind_of
+from mumacro.inputs.fields import kind_of
 from mumacro.table.atlas import QUANTITY_NAMES, SOURCES
 from tests.support.cases import (
     CASE,

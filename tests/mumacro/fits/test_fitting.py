@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mumacro import InputError, Surrogate, fit
-from mumacro.inputs.kind import CONTACTS
+from mumacro.inputs.fields import CONTACTS
 from tests.support.cases import Case
 from tests.support.comparing import close
 from tests.support.fits import least_chi2, random_points

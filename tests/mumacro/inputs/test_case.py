@@ -16,8 +16,8 @@ from mumacro.inputs.case import read
 from mumacro.inputs.doubts import remarks
 from mumacro.inputs.fields import INPUTS
 from mumacro.inputs.numbers import read_number
-from mumacro.inputs.oscillation import read_oscillation
 from mumacro.inputs.units import QUANTITIES, canonical, scale_in
+from mumacro.motions.oscillation import read_oscillation
 from tests.support.comparing import close
 
 TYPED = {

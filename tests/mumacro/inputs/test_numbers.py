@@ -4,9 +4,8 @@ with what they may be."""
 import pytest
 
 from mumacro import InputError
-from mumacro.inputs.decoding import TextError
-from mumacro.inputs.numbers import check_signs, read_number
-from mumacro.inputs.signs import Cell, Signs
+from mumacro.errors import TextError
+from mumacro.inputs.numbers import Cell, Signs, check_signs, read_number
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,11 @@ from typing import Any
 
 import pytest
 
+from mumacro.errors import TextError
 from mumacro.inputs.case import read
-from mumacro.inputs.decoding import TextError
 from mumacro.inputs.doubts import remarks
 from mumacro.inputs.layout import ColumnNames, Dialect
-from mumacro.inputs.numbers import TOO_LARGE
-from mumacro.inputs.signs import Signs
+from mumacro.inputs.numbers import TOO_LARGE, Signs
 from mumacro.inputs.text_tables import Table, read_cell, read_table
 from mumacro.inputs.units import scale_of
 from tests.support.comparing import close

@@ -19,13 +19,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mumacro.errors import InputError
+from mumacro.errors import InputError, TextError
 from mumacro.fits.fit import fit
 from mumacro.fits.measured_points import read_points
-from mumacro.inputs.decoding import Text, TextError, encoding_of
-from mumacro.inputs.headings import absent
+from mumacro.inputs.decoding import Text, encoding_of
 from mumacro.inputs.layout import BLANKS, GAPS, ColumnNames, Dialect
-from mumacro.inputs.signs import Signs, evidence
+from mumacro.inputs.names import absent
+from mumacro.inputs.numbers import Signs, evidence
 from mumacro.inputs.text_tables import Table, read_cell, read_table
 from mumacro.inputs.units import Scale
 from tests.support.comparing import close

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate
-from mumacro.inputs.kind import Kind
+from mumacro.inputs.fields import Kind
 from mumacro.kernel import threads as slices
 from mumacro.kernel.binding import CaseRows, Kernel, kernels
 from mumacro.table import atlas

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate
-from mumacro.inputs.kind import BALL, SPRING, Kind
+from mumacro.inputs.fields import BALL, SPRING, Kind
 from tests.support.cases import opened, tables
 from tests.support.seams import beyond_both_sides, doubles_at_every_seam
 

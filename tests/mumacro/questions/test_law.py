@@ -14,8 +14,7 @@ from builder.approximations import (
     border_speeds,
 )
 from mumacro import InputError, Surrogate, closed_forms, plotting
-from mumacro.inputs.fields import FIELDS
-from mumacro.inputs.kind import kind_of
+from mumacro.inputs.fields import FIELDS, kind_of
 from mumacro.questions.law import law as friction_law
 from mumacro.questions.law import sweep_values
 from tests.support.cases import CASE, PAIRS, Case, as_kind, every_pair, without
