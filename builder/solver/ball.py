@@ -78,27 +78,27 @@ class Springs:
     def __call__(self, v: Array, y: Array, eta: Array) -> dict[str, Array]:
         """At points (n,) with v~, y~ > 0, finite; eta = y~ - 1 counts in the corner."""
         block, a, b = kernels[-1].places(self._data, v, y)
-        at = np.flatnonzero(block == CORNER)
-        a[at], b[at] = _corner(v[at], eta[at])
+        i = np.flatnonzero(block == CORNER)
+        a[i], b[i] = _corner(v[i], eta[i])
         out = {name: np.zeros(v.size) for name in NAMES}
         charts = atlas.CHARTS["spring"]
         for index in np.unique(block):
-            at = np.flatnonzero(block == index)
-            vs, ys = v[at], y[at]
+            i = np.flatnonzero(block == index)
+            vs, ys = v[i], y[i]
             if index >= len(charts):
                 for name in atlas.QUANTITY_NAMES:
-                    out[name][at] = self.fine.quantity(name, vs, ys)[0]
-                out["deficit"][at] = _fast_deficit(vs, ys)
+                    out[name][i] = self.fine.quantity(name, vs, ys)[0]
+                out["deficit"][i] = _fast_deficit(vs, ys)
                 continue
             for code, quantity in enumerate(atlas.QUANTITIES):
                 if not charts[index].holds(quantity):
                     continue
-                base, factor = kernels[-1].forms(code, int(index), vs, ys, eta[at])
-                q = kernels[-1].tabulated(self._data, code, int(index), a[at], b[at])
-                out[quantity.name][at] = base + factor * q
+                base, factor = kernels[-1].forms(code, int(index), vs, ys, eta[i])
+                q = kernels[-1].tabulated(self._data, code, int(index), a[i], b[i])
+                out[quantity.name][i] = base + factor * q
                 if code == atlas.MU:
                     plain = 1.0 - base - factor * q
-                    out["deficit"][at] = np.where(base == 1.0, -factor * q, plain)
+                    out["deficit"][i] = np.where(base == 1.0, -factor * q, plain)
         return out
 
 
@@ -162,7 +162,7 @@ class Ball:
         ratio = v / y
         cuts = ratio < STEEPEST * (1.0 - 1e-15)
         entry, leave = self.crossings(np.where(cuts, ratio, 0.1))
-        inner, outer = (np.where(cuts, y / at, 1.0) for at in (entry, leave))
+        inner, outer = (np.where(cuts, y / bound, 1.0) for bound in (entry, leave))
         last = np.where(cuts, outer, np.maximum(v, y))
         width = np.minimum(3.0 * np.cbrt(ratio * ratio), 0.5)
         beyond = np.minimum(np.maximum(width, 3.0 * np.abs(y - 1.0)), 0.5)
@@ -201,30 +201,32 @@ class Ball:
         xi_of = np.sqrt(complement)
         rest_of = edges / (1.0 + xi_of)
         for piece in range(edges.shape[1] - 1):
-            at = np.flatnonzero(edges[:, piece] > edges[:, piece + 1])
-            if not at.size:
+            present = np.flatnonzero(edges[:, piece] > edges[:, piece + 1])
+            if not present.size:
                 continue
             left, right, last = (
-                xi_of[at, piece, None],
-                xi_of[at, piece + 1, None],
-                rest_of[at, piece + 1, None],
+                xi_of[present, piece, None],
+                xi_of[present, piece + 1, None],
+                rest_of[present, piece + 1, None],
             )
-            length = np.where(left > 0.5, rest_of[at, piece, None] - last, right - left)
+            length = np.where(left > 0.5, rest_of[present, piece, None] - last, right - left)
             before, behind = length * self._share, length * self._share[::-1]
             first_half = self._share < 0.5
             xi = np.where(first_half, left + before, right - behind)
             rest = np.where(first_half & (left < 0.5), 1.0 - xi, last + behind)
             s = np.maximum(rest * (1.0 + xi), 1e-290)
             # Y - s by the distance from the corner, where that is an edge, and beyond it
-            excess = np.where(s > 0.01, eta[at, None] + xi * xi, np.inf)
-            excess = np.where(at_corner[at, piece, None], before * (xi + left), excess)
-            excess = np.where(at_corner[at, piece + 1, None], -behind * (xi + right), excess)
+            excess = np.where(s > 0.01, eta[present, None] + xi * xi, np.inf)
+            excess = np.where(at_corner[present, piece, None], before * (xi + left), excess)
+            excess = np.where(at_corner[present, piece + 1, None], -behind * (xi + right), excess)
             near = np.abs(excess) < 0.3 * s
-            amplitude = np.where(near, 1.0 + excess / s, y[at, None] / s)
+            amplitude = np.where(near, 1.0 + excess / s, y[present, None] / s)
             off = np.where(near, excess / s, amplitude - 1.0)
-            integrands = self.springs((v[at, None] / s).ravel(), amplitude.ravel(), off.ravel())
+            integrands = self.springs(
+                (v[present, None] / s).ravel(), amplitude.ravel(), off.ravel()
+            )
             share = MIDDLE * s * length * self._weight
             for row, name in zip(out, NAMES, strict=True):
                 weight = share * MIDDLE * s if name in _WITH_LENGTH else share
-                row[at] += (integrands[name].reshape(s.shape) * weight).sum(axis=1)
+                row[present] += (integrands[name].reshape(s.shape) * weight).sum(axis=1)
         return out

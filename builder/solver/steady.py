@@ -277,8 +277,8 @@ def check_range(v: ArrayLike, y: ArrayLike, eta: ArrayLike) -> None:
 def _refuse(field: str, values: NDArray[np.float64], right: NDArray[np.bool_], bound: str) -> None:
     """Raise for the first of ``values`` that is not ``right``."""
     if not right.all():
-        at = int(np.argmin(right))
-        raise InputError(field, values.flat[at].item(), bound, at if values.ndim else None)
+        index = int(np.argmin(right))
+        raise InputError(field, values.flat[index].item(), bound, index if values.ndim else None)
 
 
 @solver_kernel

@@ -96,10 +96,10 @@ def _fewest(axis: Axis, exact: Callable[[Array], Array], bound: float, relative:
     step = 2 if axis.knotted else 1  # the knot of sigma is an edge of cells
     for cells in range(step, MAX_CELLS + 1, step):
         centre = 2.0 * np.arange(cells)[:, None] + 1.0
-        at, check = (low + (high - low) * 0.5 * (centre + x) / cells for x in (LOCAL, _CHECK))
+        places, check = (low + (high - low) * 0.5 * (centre + x) / cells for x in (LOCAL, _CHECK))
         live = axis.to_file(check[:, -1]) > axis.low  # cells below the block are never visited
-        at, check = at[live], check[live]
-        local = exact(at.ravel()).reshape(*at.shape, -1)
+        places, check = places[live], check[live]
+        local = exact(places.ravel()).reshape(*places.shape, -1)
         truth = exact(check.ravel()).reshape(*check.shape, -1)
         off = np.abs(truth - np.einsum("ij,cjl->cil", _FOLLOW, local))
         if relative:
@@ -190,7 +190,7 @@ def build_block(
             grow[0] = False
         if not any(grow):
             break
-        na, nb = (_next(n) if more else n for n, more in zip((na, nb), grow, strict=True))
+        na, nb = (_next(n) if grows else n for n, grows in zip((na, nb), grow, strict=True))
     follow = [max(CELL_SHARE * tolerance, NODE_FLOOR, min(best[axis], 1.0)) for axis in (0, 1)]
     if tail_block:
         follow[0] = bound

@@ -194,9 +194,9 @@ class _CellPoints:
             x.reshape(local.shape) for x in kernels[-1].cell_shares(local.ravel())
         )
         self.share_at_border = at_border[-1]
-        at = np.clip(axis.to_file(self.x.ravel()), axis.low, axis.high)
+        points = np.clip(axis.to_file(self.x.ravel()), axis.low, axis.high)
         self.from_exact = interpolation_matrix(
-            nodes, (2.0 * at - axis.low - axis.high) / (axis.high - axis.low)
+            nodes, (2.0 * points - axis.low - axis.high) / (axis.high - axis.low)
         )
         scale = np.divide(2.0, self.widths, out=np.zeros(cells), where=self.widths > 0.0)
         self.to_derivative = scale[:, None, None] * _TO_DERIVATIVE

@@ -56,9 +56,9 @@ def interpolation_errors(table: Table, sweep: Sweep, seed: int = 2018) -> dict[s
     largest error at these and along the least v~.
     """
     rng, axes = np.random.default_rng(seed), (np.log(table.v_tilde), np.log(table.y_tilde))
-    at = np.array([rng.uniform(axis[0], axis[-1], POINTS) for axis in axes])
+    inner = np.array([rng.uniform(axis[0], axis[-1], POINTS) for axis in axes])
     edge = np.array([np.full(POINTS, axes[0][0]), rng.uniform(axes[1][0], axes[1][-1], POINTS)])
-    where = np.concatenate([at, edge], axis=1)
+    where = np.concatenate([inner, edge], axis=1)
     truth = sweep.solve("full", *np.exp(where))["mu_ratio"]
     values = {
         "linear": RegularGridInterpolator(axes, table.mu_ratio)(where.T),

@@ -172,13 +172,13 @@ def _slopes(
     return _Comparison(off, off, bound, over, off > bound, np.tile(source[keep], 2))
 
 
-def _summary(comparison: _Comparison, at: Any = slice(None)) -> dict[str, Any]:
+def _summary(comparison: _Comparison, selected: Any = slice(None)) -> dict[str, Any]:
     return {
-        "points": int(comparison.error[at].size),
-        "max_abs_error": float(comparison.error[at].max()),
-        "max_rel_error": float(comparison.relative[at].max()),
-        "max_bound": float(comparison.bound[at].max()),
-        "not_covered": int(np.count_nonzero(comparison.misses[at])),
+        "points": int(comparison.error[selected].size),
+        "max_abs_error": float(comparison.error[selected].max()),
+        "max_rel_error": float(comparison.relative[selected].max()),
+        "max_bound": float(comparison.bound[selected].max()),
+        "not_covered": int(np.count_nonzero(comparison.misses[selected])),
     }
 
 

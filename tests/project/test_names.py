@@ -1,6 +1,7 @@
-"""Documents, manifests and examples name no file, option, setting or metric that is not there.
+"""Documents, manifests and examples name no file, option, setting or metric that is not there;
+names in the code are nouns of the field.
 
-CHANGELOG.md may: it tells what has gone.
+CHANGELOG.md may name what has gone.
 """
 
 import ast
@@ -254,3 +255,86 @@ def test_no_two_modules_of_the_library_have_one_name() -> None:
     stems = [path.stem for path in modules if path.parent.name != "cli"]
     assert len(stems) > 50
     assert len({*stems}) == len(stems), sorted(stem for stem in stems if stems.count(stem) > 1)
+
+
+# --- names in the code ----------------------------------------------------------------------------
+
+#: words that do not say what a value is, and one that had three meanings
+BANNED = {"at", "both", "given", "like", "more", "others", "own", "reading", "strange"}
+#: the folders and files whose names are nouns
+CLEAN = (
+    "builder",
+    "src/mumacro/contacts",
+    "src/mumacro/errors.py",
+    "src/mumacro/fits",
+    "src/mumacro/kernel",
+    "src/mumacro/motions",
+    "src/mumacro/outputs",
+    "src/mumacro/questions",
+    "src/mumacro/table",
+)
+
+
+def bindings(tree: ast.AST) -> Iterator[tuple[int, str]]:
+    """Yield each name that a program binds, with its line."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.FunctionDef(name=bound) | ast.AsyncFunctionDef(name=bound):
+                yield node.lineno, bound
+            case ast.ClassDef(name=bound) | ast.ExceptHandler(name=str(bound)):
+                yield node.lineno, bound
+            case ast.arg(arg=bound):
+                yield node.lineno, bound
+            case ast.Name(id=bound, ctx=ast.Store()) | ast.Attribute(attr=bound, ctx=ast.Store()):
+                yield node.lineno, bound
+            case ast.alias(name=imported, asname=renamed):
+                yield node.lineno, renamed or imported
+            case ast.MatchAs(name=str(bound)) | ast.MatchStar(name=str(bound)):
+                yield node.lineno, bound
+            case ast.MatchMapping(rest=str(bound)):
+                yield node.lineno, bound
+
+
+def banned_names(path: Path) -> list[str]:
+    """Return the banned names that a module has or binds, with their lines."""
+    found = [(1, path.stem), *bindings(ast.parse(path.read_text("utf-8")))]
+    return [f"{path.name}:{line} {bound}" for line, bound in found if bound.strip("_") in BANNED]
+
+
+@pytest.mark.parametrize("place", CLEAN)
+def test_names_in_the_code_are_nouns_of_the_field(place: str) -> None:
+    path = ROOT / place
+    modules = [path] if path.suffix == ".py" else sorted(path.rglob("*.py"))
+    assert modules
+    assert [found for module in modules for found in banned_names(module)] == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "def at(): ...",
+        "async def _given(): ...",
+        "class own: ...",
+        "def f(x, *, more=1): ...",
+        "def f(**others): ...",
+        "lambda like: like",
+        "both = 1",
+        "for at, x in []: ...",
+        "[at for at in []]",
+        "x.at = 1",
+        "if (own := 1): ...",
+        "import json as strange",
+        "from mumacro.files import reading",
+        "with open('x') as given: ...",
+        "try: ...\nexcept OSError as others: ...",
+        "match x:\n    case [1, *more]: ...",
+        "match x:\n    case {'a': 1, **others}: ...",
+        "match x:\n    case 1 as given: ...",
+    ],
+)
+def test_a_banned_name_is_found(tmp_path: Path, text: str) -> None:
+    module = tmp_path / "module.py"
+    module.write_text(text, "utf-8")
+    assert len(banned_names(module)) == 1
+    (module := tmp_path / "reading.py").write_text("x = 1", "utf-8")
+    assert len(banned_names(module)) == 1

@@ -138,8 +138,8 @@ class Element:
                 raise InputError(
                     "Fz", Fz, "left out for a ball, whose contact radius would change with it"
                 )
-            limit = self._limits(self._like(Fz, "Fz"))
-        along, across = self._like(dx, "dx"), self._like(dy, "dy")
+            limit = self._limits(self._per_contact(Fz, "Fz"))
+        along, across = self._per_contact(dx, "dx"), self._per_contact(dy, "dy")
         before, self._limit, sums = self._limit, limit, np.empty((self._k.size, 2))
         _KERNEL.element_steps(before, limit, self._k, along, across, self._forces, sums)
         return self._pair(sums)
@@ -188,7 +188,7 @@ class Element:
             )
         return limit
 
-    def _like(self, value: Numbers, name: str) -> Array:
+    def _per_contact(self, value: Numbers, name: str) -> Array:
         """Return ``value`` for every contact, (n,) and contiguous; finite."""
         if type(value) is float and math.isfinite(value):
             return np.full(self._k.size, value)

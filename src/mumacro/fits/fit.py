@@ -114,7 +114,7 @@ class _Problem(Measured):
         def model(s: Array, slopes: bool) -> tuple[Array, Array]:
             with np.errstate(over="ignore"):
                 x = np.exp(s)
-            mu, slope = self.at(along, x, np.ones(x.size) if has_factor else None, slopes)
+            mu, slope = self.model_along(along, x, np.ones(x.size) if has_factor else None, slopes)
             steps = slope * np.where(np.isfinite(x), x, 0.0)[:, None]
             return mu * self.weight, np.nan_to_num(steps, posinf=0.0, neginf=0.0) * self.weight
 
@@ -168,7 +168,7 @@ class _Problem(Measured):
             return 1e-12 * size if math.isinf(variance) else max(variance, 1e-14 * size)
 
         profile = self._profile(lambda chi2: chi2 + width**2 * barrier_at(chi2))
-        if "k" in self.unknowns and np.ptp(profile.at.chi2) <= 1e-12 * size:
+        if "k" in self.unknowns and np.ptp(profile.samples.chi2) <= 1e-12 * size:
             bound = (
                 "points in which k matters: up to a factor, every k fits these alike; vary v0 "
                 f"or {self.amplitude}"
@@ -211,9 +211,9 @@ class _Problem(Measured):
         way to every better solution; else it is a ripple of that one.
         """
         minima = [
-            _Minimum(float(profile.at.chi2[i]), self._values_at(profile, i), i)
+            _Minimum(float(profile.samples.chi2[i]), self._values_at(profile, i), i)
             for i in profile.lowest().tolist()
-            if profile.at.chi2[i] <= profile.limit
+            if profile.samples.chi2[i] <= profile.limit
         ]
         minima.sort(key=lambda minimum: minimum.chi2)
         barrier = barrier_at(minima[0].chi2)
@@ -227,7 +227,10 @@ class _Problem(Measured):
     def _values_at(self, profile: Profile, sample: int) -> dict[str, float]:
         """Return the unknowns at a sample."""
         with np.errstate(over="ignore"):
-            x, factor = float(np.exp(profile.at.s[sample])), float(profile.at.factor[sample])
+            x, factor = (
+                float(np.exp(profile.samples.s[sample])),
+                float(profile.samples.factor[sample]),
+            )
         if len(self.unknowns) == 1:
             return {self.unknowns[0]: x}
         factor = max(factor, 1e-300)
@@ -280,7 +283,7 @@ class _Problem(Measured):
         """Return the smallest and the largest value of each unknown among the contacts that are
         allowed; where the softest is, k has no lower bound."""
         ranges = dict(zip(self.unknowns, profile.ranges(), strict=True))
-        if profile.at.chi2[0] <= profile.limit:
+        if profile.samples.chi2[0] <= profile.limit:
             along = self.unknowns[0]
             ranges[along] = 0.0, ranges[along][1]
         return ranges

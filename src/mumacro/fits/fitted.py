@@ -208,9 +208,9 @@ class Fit(Result):
         sets, member = np.unique([self.points[name] for name in names], axis=1, return_inverse=True)
         fine = _fine(x)
         if sets.shape[1] == x.size > 1:
-            others = {name: _interpolated(x, self.points[name], fine) for name in names}
+            fixed = {name: _interpolated(x, self.points[name], fine) for name in names}
             every = np.ones(x.size, np.bool_)
-            curves = [self._curve("fit", along, every, fine, others)]
+            curves = [self._curve("fit", along, every, fine, fixed)]
             return plotting.plot_fit(along, curves, self._title(), ax)
         curves = []
         for i, row in enumerate(sets.T):
@@ -219,17 +219,17 @@ class Fit(Result):
                 for name, x, all_ in zip(names, row, sets, strict=True)
                 if all_.min() < all_.max()
             ]
-            here, others = member.ravel() == i, dict(zip(names, row, strict=True))
+            here, fixed = member.ravel() == i, dict(zip(names, row, strict=True))
             label, places = ", ".join(differing) or "fit", np.union1d(fine, x[here])
-            curves.append(self._curve(label, along, here, places, others))
+            curves.append(self._curve(label, along, here, places, fixed))
         return plotting.plot_fit(along, curves, self._title(), ax)
 
     def _curve(
-        self, label: str, along: str, here: Bools, fine: Array, others: Mapping[str, Any]
+        self, label: str, along: str, here: Bools, fine: Array, fixed: Mapping[str, Any]
     ) -> plotting.Curve:
-        """Return points ``here``, and the fit over the values ``fine`` of an input beside the
-        others."""
-        mu, deviation = self.predict(**{along: fine}, **others)
+        """Return the curve of the fit over the values ``fine`` of one input, with the points that
+        ``here`` selects; ``fixed`` holds the other inputs."""
+        mu, deviation = self.predict(**{along: fine}, **fixed)
         bars = self.points[STD][here] if STD in self.points else None
         x, friction, residuals = (
             column[here] for column in (self.points[along], self.points["mu_macro"], self.residuals)

@@ -184,8 +184,8 @@ class _Loop:
         times = np.arange(n, dtype=np.float64)[self.counted]
         middle, half = 0.5 * (times[0] + times[-1]), max(0.5 * float(np.ptp(times)), 1.0)
         self.names = [] if self.open else ["offset", *(["drift"] if self.number > 1 else [])]
-        both = np.stack([np.ones(times.size), (times - middle) / half], axis=1)
-        self.linear = both[:, : len(self.names)]
+        terms = np.stack([np.ones(times.size), (times - middle) / half], axis=1)
+        self.linear = terms[:, : len(self.names)]
         # the drift is that of the samples from the first on, the offset that at the first
         self.first, self.step = (times[0] - middle) / half, 1.0 / half
         self.basis = np.linalg.qr(self.linear)[0] if self.names else self.linear
@@ -236,8 +236,8 @@ class _Loop:
         start, tau = 0.0, 1.0
         for _ in range(_STEPS):
             profile = self._profile(start, width**2 * tau / self.dof)
-            best = int(np.argmin(profile.at.chi2))
-            mu0 = float(profile.at.factor[best])
+            best = int(np.argmin(profile.samples.chi2))
+            mu0 = float(profile.samples.factor[best])
             if not self.open or mu0 <= 0.0:
                 break
             before, start = start, float(self.force[0]) / mu0
@@ -245,7 +245,7 @@ class _Loop:
                 break
         if not mu0 > 0.0:
             raise InputError("force", "forces", "larger where the displacement has grown")
-        s, mu0 = self._polished(float(profile.at.s[best]), mu0)
+        s, mu0 = self._polished(float(profile.samples.s[best]), mu0)
         start = float(self.force[0]) / mu0 if self.open else 0.0
         rows, slopes = (part[0] for part in self._rows(np.exp([s]), start))
         linear = self._linear(rows, mu0)
@@ -379,7 +379,7 @@ class _Loop:
         }
         straight = np.abs(self._aside(slopes[None, self.counted])).max() > 1e-6 * self.load
         narrow = straight and max(off[0], off[1] / mu0) < _NARROW
-        if narrow and math.isfinite(values["k"]) and profile.at.chi2[0] > profile.limit:
+        if narrow and math.isfinite(values["k"]) and profile.samples.chi2[0] > profile.limit:
             return around
         return self._by_profile(profile) | self._linear_by_profile(profile, around)
 
@@ -387,7 +387,7 @@ class _Loop:
         """Return the smallest and the largest k and mu0 among the contacts that are allowed; where
         a line is, the loop need not slip, and mu0 has no upper bound."""
         ranges = dict(zip(("k", "mu0"), profile.ranges(), strict=True))
-        if profile.at.chi2[0] <= profile.limit:
+        if profile.samples.chi2[0] <= profile.limit:
             ranges["mu0"] = ranges["mu0"][0], math.inf
         return ranges
 
@@ -397,9 +397,9 @@ class _Loop:
         """Return smallest and largest offset and drift among them."""
         if not self.names:
             return {}
-        allowed = np.flatnonzero(profile.at.chi2 <= profile.limit)
+        allowed = np.flatnonzero(profile.samples.chi2 <= profile.limit)
         allowed = allowed[:: 1 + allowed.size // _ALLOWED]
-        rows, _ = self._rows(np.exp(profile.at.s[allowed]), 0.0)
+        rows, _ = self._rows(np.exp(profile.samples.s[allowed]), 0.0)
         ends = {name: list(around[name]) for name in self.names}
         for i, row in zip(allowed.tolist(), rows[:, self.counted], strict=True):
             look()
@@ -411,7 +411,7 @@ class _Loop:
                 turned = np.array([[1.0, self.first], [0.0, self.step]])
             middle = turned @ shares[1:]
             spread = np.diag(turned @ inverse[1:, 1:] @ turned.T)
-            half = np.sqrt(np.maximum(profile.limit - profile.at.chi2[i], 0.0) * spread)
+            half = np.sqrt(np.maximum(profile.limit - profile.samples.chi2[i], 0.0) * spread)
             for name, value, off in zip(self.names, middle.tolist(), half.tolist(), strict=True):
                 ends[name] = [min(ends[name][0], value - off), max(ends[name][1], value + off)]
         return {name: (low, high) for name, (low, high) in ends.items()}

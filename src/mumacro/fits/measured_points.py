@@ -275,7 +275,7 @@ class Measured:
         }
         return answer.mu_macro, slopes
 
-    def at(
+    def model_along(
         self, name: str, x: Array, mu0: Array | None = None, slopes: bool = True
     ) -> tuple[Array, Array]:
         """Return mu_macro at values ``x`` (m,) of one unknown, and its slope along it, zero unless

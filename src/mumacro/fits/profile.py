@@ -94,7 +94,7 @@ class Profile:
     ) -> None:
         self._model, self._measured, self._has_factor = model, measured, has_factor
         self._limit_of = limit_of
-        self.at = self.samples(s)
+        self.samples = self.sample(s)
         self._refine()
         self._insert(self._minima())
         self._refine()
@@ -103,9 +103,9 @@ class Profile:
     @property
     def limit(self) -> float:
         """The chi2 up to which a contact is allowed."""
-        return self._limit_of(float(self.at.chi2.min()))
+        return self._limit_of(float(self.samples.chi2.min()))
 
-    def samples(self, s: Array, slopes: bool = True) -> Samples:
+    def sample(self, s: Array, slopes: bool = True) -> Samples:
         """Return the curve at places ``s`` (m,); slopes and tilt are zero unless asked for."""
         rows, steps = self._model(s, slopes)
         squares = _dots(rows, rows)
@@ -122,24 +122,24 @@ class Profile:
 
     def lowest(self) -> Places:
         """Return the samples that are minima."""
-        chi2 = np.concatenate(([np.inf], self.at.chi2, [np.inf]))
+        chi2 = np.concatenate(([np.inf], self.samples.chi2, [np.inf]))
         return np.flatnonzero((chi2[1:-1] < chi2[:-2]) & (chi2[1:-1] <= chi2[2:]))
 
     def ridge(self, one: int, other: int) -> float:
         """Return the largest chi2 on the way from one sample to another."""
-        return float(self.at.chi2[min(one, other) : max(one, other) + 1].max())
+        return float(self.samples.chi2[min(one, other) : max(one, other) + 1].max())
 
     # --- sampling ---------------------------------------------------------------------------------
 
     def _insert(self, s: Array) -> None:
-        s = np.setdiff1d(s, self.at.s)
+        s = np.setdiff1d(s, self.samples.s)
         if not s.size:
             return
-        places = np.searchsorted(self.at.s, s)
-        self.at = Samples(
+        places = np.searchsorted(self.samples.s, s)
+        self.samples = Samples(
             *(
                 np.insert(old, places, new, axis=0)
-                for old, new in zip(self.at, self.samples(s), strict=True)
+                for old, new in zip(self.samples, self.sample(s), strict=True)
             )
         )
 
@@ -148,17 +148,17 @@ class Profile:
             near, error, width = self._chords()
             limit = self.limit
             reach = np.sqrt(limit)
-            tolerance = _FINE * (limit - self.at.chi2.min()) / reach if reach > 0.0 else 0.0
+            tolerance = _FINE * (limit - self.samples.chi2.min()) / reach if reach > 0.0 else 0.0
             halved = (near - error < reach) & (error > tolerance) & (width > _NARROWEST)
             if not halved.any():
                 return
-            self._insert(self.at.s[:-1][halved] + 0.5 * width[halved])
+            self._insert(self.samples.s[:-1][halved] + 0.5 * width[halved])
 
     def _chords(self) -> tuple[Array, Array, Array]:
         """Return of each chord the distance of the measured point, how far the line may leave
         it, and its width; (m - 1,) each."""
-        a, b = self.at.rows[:-1], self.at.rows[1:]
-        chord, width = b - a, np.diff(self.at.s)
+        a, b = self.samples.rows[:-1], self.samples.rows[1:]
+        chord, width = b - a, np.diff(self.samples.s)
         m = self._measured
         with np.errstate(all="ignore"):
             if self._has_factor:
@@ -174,14 +174,14 @@ class Profile:
             inner *= factor[:, None]
             inner -= m
             near = np.sqrt(_dots(inner, inner))
-            near = np.fmin(near, np.sqrt(np.minimum(self.at.chi2[:-1], self.at.chi2[1:])))
+            near = np.fmin(near, np.sqrt(np.minimum(self.samples.chi2[:-1], self.samples.chi2[1:])))
             # a corner between straight ends leaves the chord by half of the larger difference
             off = []
-            for end in (self.at.slopes[:-1], self.at.slopes[1:]):
+            for end in (self.samples.slopes[:-1], self.samples.slopes[1:]):
                 way = width[:, None] * end
                 way -= chord
                 off.append(np.sqrt(_dots(way, way)))
-            largest = np.maximum(self.at.factor[:-1], self.at.factor[1:])
+            largest = np.maximum(self.samples.factor[:-1], self.samples.factor[1:])
             error = 0.5 * largest * np.fmax(*off)
         width = np.where(np.isfinite(width), width, 0.0)
         return near, np.where(width > 0.0, error, 0.0), width
@@ -190,28 +190,28 @@ class Profile:
         """Return where chi2 turns from falling to rising, if that is allowed and more than a
         ripple."""
         near, error, width = self._chords()
-        ripple = _RIPPLE * (self.limit - self.at.chi2.min())
-        depth = self.at.tilt[:-1] * width, self.at.tilt[1:] * width
+        ripple = _RIPPLE * (self.limit - self.samples.chi2.min())
+        depth = self.samples.tilt[:-1] * width, self.samples.tilt[1:] * width
         turns = (depth[0] < -ripple) & (depth[1] > ripple)
         turns &= near - error < np.sqrt(self.limit)
-        return self._zeros(np.flatnonzero(turns), lambda at: at.tilt, 1e-13, slopes=True)
+        return self._zeros(np.flatnonzero(turns), lambda samples: samples.tilt, 1e-13, slopes=True)
 
     def _lowest_places(self) -> Array:
         """Return where chi2 is least beside each sample that is a minimum and allowed: the curve
         may bend between two samples, and its slope jump, so their slopes say nothing of it."""
-        s, here = self.at.s, self.lowest()
-        here = here[(self.at.chi2[here] <= self.limit) & np.isfinite(s[here])]
+        s, here = self.samples.s, self.lowest()
+        here = here[(self.samples.chi2[here] <= self.limit) & np.isfinite(s[here])]
         ends = np.flatnonzero(np.isfinite(s))[[0, -1]]
         low, high = (s[np.clip(here + side, *ends)] for side in (-1, 1))
-        best, least, each = s[here].copy(), self.at.chi2[here].copy(), np.arange(here.size)
+        best, least, each = s[here].copy(), self.samples.chi2[here].copy(), np.arange(here.size)
         for _ in range(_LOWEST_ROUNDS if here.size else 0):
             places = np.linspace(low, high, _ZOOM, axis=1)
-            chi2 = self.samples(places.ravel(), slopes=False).chi2.reshape(places.shape)
+            chi2 = self.sample(places.ravel(), slopes=False).chi2.reshape(places.shape)
             j = np.argmin(chi2, axis=1)
             better = chi2[each, j] < least
             best, least = np.where(better, places[each, j], best), np.minimum(chi2[each, j], least)
             low, high = (places[each, np.clip(j + side, 0, _ZOOM - 1)] for side in (-1, 1))
-        return best[least < self.at.chi2[here] * (1.0 - _SAME)]
+        return best[least < self.samples.chi2[here] * (1.0 - _SAME)]
 
     def _zeros(
         self, chords: Places, quantity: Callable[[Samples], Array], tolerance: float, slopes: bool
@@ -219,18 +219,16 @@ class Profile:
         """Return places in the chords at which a quantity passes through zero."""
         from scipy.optimize import brentq
 
-        s, f = self.at.s.tolist(), quantity(self.at).tolist()
+        s, f = self.samples.s.tolist(), quantity(self.samples).tolist()
 
         def zero(i: int) -> float:
-            samples = {
-                s[i]: f[i],
-                s[i + 1]: f[i + 1],
-            }  # computed again, they may differ by rounding
+            # computed again, these two may differ by rounding
+            known = {s[i]: f[i], s[i + 1]: f[i + 1]}
 
             def value(place: float) -> float:
-                if place in samples:
-                    return float(samples[place])
-                return float(quantity(self.samples(np.array([place]), slopes))[0])
+                if place in known:
+                    return float(known[place])
+                return float(quantity(self.sample(np.array([place]), slopes))[0])
 
             return float(brentq(value, s[i], s[i + 1], xtol=tolerance, rtol=1e-14))
 
@@ -244,55 +242,57 @@ class Profile:
 
         Where the last place, of infinite s, is allowed the first has no upper bound.
         """
-        at, inside = self.at, self.at.chi2 <= self.limit
-        finite = np.isfinite(at.s)
+        samples, inside = self.samples, self.samples.chi2 <= self.limit
+        finite = np.isfinite(samples.s)
         goals = _WITH_FACTOR if self._has_factor else _ALONE
         low, high = [math.inf] * (len(goals) // 2), [0.0] * (len(goals) // 2)
         if inside[finite].any():
             ends = self._ends(goals)
             low, high = [max(-end, 0.0) for end in ends[::2]], ends[1::2]
         if inside[-1]:
-            low[0] = min(low[0], float(np.exp(at.s[finite][-1]) * at.factor[-1]))
+            low[0] = min(low[0], float(np.exp(samples.s[finite][-1]) * samples.factor[-1]))
             high[0] = math.inf
         if inside[-1] and self._has_factor:
-            half = math.sqrt((self.limit - at.chi2[-1]) / at.rise[-1])
-            low[1] = min(low[1], max(float(at.factor[-1]) - half, 0.0))
-            high[1] = max(high[1], float(at.factor[-1]) + half)
+            half = math.sqrt((self.limit - samples.chi2[-1]) / samples.rise[-1])
+            low[1] = min(low[1], max(float(samples.factor[-1]) - half, 0.0))
+            high[1] = max(high[1], float(samples.factor[-1]) + half)
         return [*zip(low, high, strict=True)]
 
     def _ends(self, goals: Sequence[Goal]) -> list[float]:
         """Return the largest value of each goal over the contacts that are allowed, of finite s."""
-        inside = self.at.chi2 <= self.limit
+        inside = self.samples.chi2 <= self.limit
         s = self._allowed_places(inside)
-        at = self.samples(s, slopes=False)
-        starts = [int(np.argmax(self._values(goal, at))) for goal in goals]
+        samples = self.sample(s, slopes=False)
+        starts = [int(np.argmax(self._values(goal, samples))) for goal in goals]
         low = np.array([s[max(i - 1, 0)] for i in starts])
         high = np.array([s[min(i + 1, s.size - 1)] for i in starts])
-        best = [float(self._values(goal, at)[i]) for goal, i in zip(goals, starts, strict=True)]
+        best = [
+            float(self._values(goal, samples)[i]) for goal, i in zip(goals, starts, strict=True)
+        ]
         for _ in range(_ZOOMS if self._has_factor else 0):  # else the ends are borders
             places = np.linspace(low, high, _ZOOM, axis=1)
-            at = self.samples(places.ravel(), slopes=False)
+            samples = self.sample(places.ravel(), slopes=False)
             for i, goal in enumerate(goals):
-                values = self._values(goal, at)[i * _ZOOM : (i + 1) * _ZOOM]
+                values = self._values(goal, samples)[i * _ZOOM : (i + 1) * _ZOOM]
                 j = int(np.argmax(values))
                 best[i] = max(best[i], float(values[j]))
                 low[i], high[i] = places[i, max(j - 1, 0)], places[i, min(j + 1, _ZOOM - 1)]
         return best
 
-    def _values(self, goal: Goal, at: Samples) -> Array:
-        spare = self.limit - at.chi2
-        half_width = np.sqrt(np.maximum(spare, 0.0) / at.rise)
+    def _values(self, goal: Goal, samples: Samples) -> Array:
+        spare = self.limit - samples.chi2
+        half_width = np.sqrt(np.maximum(spare, 0.0) / samples.rise)
         # places at the border of what is allowed miss it by a rounding error
         allowed = spare >= -1e-9 * self.limit
-        return np.where(allowed, goal(at.s, at.factor, half_width), -np.inf)
+        return np.where(allowed, goal(samples.s, samples.factor, half_width), -np.inf)
 
     def _allowed_places(self, inside: Bools) -> Array:
         """Return finite places that are allowed, ascending: the samples, their borders, and some
         between."""
-        finite, limit = np.isfinite(self.at.s), self.limit
+        finite, limit = np.isfinite(self.samples.s), self.limit
         crossings = np.flatnonzero((inside[:-1] != inside[1:]) & finite[1:])
-        borders = self._zeros(crossings, lambda at: at.chi2 - limit, 1e-9, slopes=False)
-        s = np.unique(np.concatenate([self.at.s[inside & finite], borders]))
+        borders = self._zeros(crossings, lambda samples: samples.chi2 - limit, 1e-9, slopes=False)
+        s = np.unique(np.concatenate([self.samples.s[inside & finite], borders]))
         parts = 1 + _INSIDE // max(s.size, 1)
         between = np.linspace(s[:-1], s[1:], parts, endpoint=False).ravel()
         return np.unique(np.concatenate([s, between]))

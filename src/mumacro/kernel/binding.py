@@ -89,8 +89,8 @@ def _columns_of(columns: Sequence[Array | float], start: int) -> Any:
         if isinstance(column, float):
             constants[i] = column
         else:
-            at = _from_buffer(_NUMBERS, column)
-            arrays[i] = at + start if start else at
+            pointer = _from_buffer(_NUMBERS, column)
+            arrays[i] = pointer + start if start else pointer
     return of_kernel
 
 
@@ -307,8 +307,8 @@ class Kernel:
     ) -> tuple[float, float, int]:
         """Return a quantity at one point in plain numbers, its bound and the source."""
         point, code = _new(_POINT, (v, y)), _new(_CODE)
-        at = point, point + 1, point + 2, point + 3
-        self._values(data.pointer, contact, 0, quantity, 1, *at, code)
+        pointers = point, point + 1, point + 2, point + 3
+        self._values(data.pointer, contact, 0, quantity, 1, *pointers, code)
         return point[2], point[3], code[0]
 
     def slopes(

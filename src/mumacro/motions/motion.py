@@ -51,7 +51,7 @@ class Term(NamedTuple):
     amplitude: Array  #: [m], of the normal force [N]; ``(n,)`` once broadcast
     phase: Array  #: [rad]
 
-    def at(self, tau: Array, i: int) -> Array:
+    def evaluate(self, tau: Array, i: int) -> Array:
         """Return values of case i at tau = omega t."""
         out: Array = self.amplitude[i] * np.sin(self.harmonic * tau + self.phase[i])
         return out
@@ -167,8 +167,8 @@ class Motion(Result):
         shares = weights = np.ones(1)
         if scenes.contact == "ball":
             nodes, halves = np.polynomial.legendre.leggauss(_SPRINGS)
-            at = 0.5 * (nodes + 1.0)
-            shares, weights = 1.5 * at**2 * (2.0 - at**2), halves * at
+            a = 0.5 * (nodes + 1.0)
+            shares, weights = 1.5 * a**2 * (2.0 - a**2), halves * a
         case = scenes.dimensionless[i].copy()
         forces = _KERNEL.motion_cycle(
             scenes.orders, case, shares, weights, scenes.tolerance, points, current().flag
@@ -177,7 +177,8 @@ class Motion(Result):
         mu0, Fz, _, omega, v0 = (float(column[i]) for column in scenes.columns.values())
         tau = np.linspace(0.0, 2.0 * math.pi, points + 1)
         x, y, load = (
-            sum((term.at(tau, i) for term in part), np.zeros(tau.size)) for part in scenes.terms
+            sum((term.evaluate(tau, i) for term in part), np.zeros(tau.size))
+            for part in scenes.terms
         )
         Fx, Fy = mu0 * Fz * forces.T
         return Cycle(tau / omega, v0 * (tau / omega) + x, y, Fx, Fy, Fz + load)
@@ -460,7 +461,7 @@ def _lowest_load(scenes: Scenes, legal: Bools) -> Array:
     for i in np.flatnonzero(legal & ~(low > 0.0)):
         # between the points it is lower by less than its curvature allows
         bend = sum(term.harmonic**2 * term.amplitude[i] for term in part)
-        load = Fz[i] + sum((term.at(tau, int(i)) for term in part), np.zeros(tau.size))
+        load = Fz[i] + sum((term.evaluate(tau, int(i)) for term in part), np.zeros(tau.size))
         low[i] = load.min() - bend * tau[1] ** 2 / 8.0
     return low
 

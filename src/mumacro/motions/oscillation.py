@@ -92,13 +92,18 @@ def _of_text(name: str, text: str) -> list[tuple[Any, Any, Any]]:
     parts = []
     for piece in pieces:
         before, colon, rest = piece.rpartition(":")
-        amplitude, at, phase = rest.partition("@")
-        if ":" in before or "@" in phase or not amplitude.strip() or (at and not phase.strip()):
+        amplitude, separator, phase = rest.partition("@")
+        if (
+            ":" in before
+            or "@" in phase
+            or not amplitude.strip()
+            or (separator and not phase.strip())
+        ):
             raise InputError(name, text, _FORM)
-        if not at and (meant := _with_phase(name, amplitude)):
+        if not separator and (meant := _with_phase(name, amplitude)):
             bound = f"an amplitude, and its phase behind @: did you mean {meant}?"
             raise InputError(name, text, bound)
-        parts.append((before.strip() if colon else 1, amplitude, phase if at else 0.0))
+        parts.append((before.strip() if colon else 1, amplitude, phase if separator else 0.0))
     return parts
 
 

@@ -76,7 +76,7 @@ class MotionSolution(Solution):
         places = [root.value for roots in self.roots for root in roots]
         even = np.geomspace if _log(x[0], x[-1]) else np.linspace
         x = np.unique(np.clip([*x, *even(x[0], x[-1], _DRAWN), *places], x[0], x[-1]))
-        mean, _ = Curve(self.unknown, self.of, self.case).at(x)
+        mean, _ = Curve(self.unknown, self.of, self.case).evaluate(x)
         case = {name: value for name, value in self.case.items() if name in INPUTS}
         title = plotting.in_words(case, {"contact": self.case.get("contact", "spring")})
         axis, log = _axis(self.unknown), _log(x[0], x[-1])
@@ -104,9 +104,9 @@ class MotionSolution(Solution):
 
     def _members(self) -> dict[str, Any]:
         other = self.other_way
-        others = {} if other is None else {"other_way": other._results()}
+        opposite = {} if other is None else {"other_way": other._results()}
         named = {"unknown": self.unknown, "unit": self.unit, "of": self.of}
-        return {**named, **self._answers(), **others}
+        return {**named, **self._answers(), **opposite}
 
 
 @np.errstate(all="ignore")
@@ -177,7 +177,7 @@ def _solved(curve: "Curve", low: float, high: float, targets: Array) -> MotionSo
     search = Search(curve, _places(curve, low, high), low, high, targets)
     samples = search.samples
     if samples.x.size < 4:
-        curve.at(np.asarray(0.5 * (low + high)))  # says why
+        curve.evaluate(np.asarray(0.5 * (low + high)))  # says why
         raise InputError("within", (low, high), "a range in which the motion is possible")
     found = search.roots()
     if curve.unknown.endswith(".phase") and high - low == 360.0:
@@ -247,7 +247,7 @@ class Curve:
         opposite = [(order, amplitude, phase + 180.0) for order, amplitude, phase in terms]
         return Curve(self.unknown, self.of, {**self.case, "x": opposite})
 
-    def at(self, values: Array) -> tuple[Array, Array]:
+    def evaluate(self, values: Array) -> tuple[Array, Array]:
         """Return the mean force and the estimate of its error, each in the shape of the values; NaN
         where there is no motion."""
         case = dict(self.case)

@@ -93,7 +93,7 @@ class Evaluated:
         crit = self.tabulated.crit(np.atleast_1d(y), self.kind)
         return crit if self.cases.shape else _item(crit)
 
-    def at(self, **columns: Any) -> "Evaluated":
+    def replace(self, **columns: Any) -> "Evaluated":
         """Return the answers to the same cases with other values of some inputs, and one k."""
         cases = self.cases._replace(columns={**self.columns, **columns}, ends=None)
         return Evaluated(self.tabulated, cases)

@@ -17,9 +17,9 @@ def limits(cases: Evaluated) -> Values:
         speed = where(cases.usable, cases.length_scale * crit * omega, math.nan)
         speed = where(cases.moving, where(cases.rigid, 0.0, speed), 0.0)
     return {
-        "limits.mu_static": cases.at(v0=0.0).mu_macro,
+        "limits.mu_static": cases.replace(v0=0.0).mu_macro,
         "limits.v0_crit": speed,
-        "limits.mu_crit": cases.at(v0=speed).mu_macro,
+        "limits.mu_crit": cases.replace(v0=speed).mu_macro,
     }
 
 

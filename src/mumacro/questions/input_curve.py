@@ -46,18 +46,20 @@ class InputCurve:
         gradient: bool = False,
         groups: bool = False,
         strict: bool = False,
-        **others: Any,
+        **replaced: Any,
     ) -> Answer[Any]:
-        """Return the surrogate's results at the values ``x`` (n,) of the input [SI]; ``others``
-        replace inputs of the case. InputError for a value out of bounds where ``strict``, else
-        NaN."""
-        cases = self.cases(x, strict, **others)
+        """Return the surrogate's answers at values ``x`` (n,) of the input [SI].
+
+        ``replaced`` holds other values for inputs of the case.  A value out of bounds raises
+        InputError where ``strict``; otherwise its answer is NaN.
+        """
+        cases = self.cases(x, strict, **replaced)
         return self.surrogate.answer(cases, (GRADIENT,) if gradient else (), groups)
 
-    def cases(self, x: Any, strict: bool, **others: Any) -> Cases:
-        """Return the cases that :meth:`answer` evaluates; ``others`` may have deviations, too."""
+    def cases(self, x: Any, strict: bool, **replaced: Any) -> Cases:
+        """Return the cases that :meth:`answer` evaluates; ``replaced`` may hold deviations, too."""
         k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
-        return Cases.of({**self.case, **k, self.unknown: x, **others}, self.kind, strict)
+        return Cases.of({**self.case, **k, self.unknown: x, **replaced}, self.kind, strict)
 
     def groups(self, x: float) -> tuple[float, float]:
         """Return v~ and y~ at one value of the input, from the inputs alone."""
@@ -72,7 +74,7 @@ class InputCurve:
         """Return mu_macro [-] at ``x`` (n,)."""
         return np.asarray(self.answer(x).mu_macro)
 
-    def at(self, x: Array) -> tuple[Array, Array]:
+    def evaluate(self, x: Array) -> tuple[Array, Array]:
         """Return mu_macro [-] at ``x`` and the bound of its error, each in the shape of ``x``."""
         answer = self.answer(x)
         return np.asarray(answer.mu_macro), np.asarray(answer.error_bound)

@@ -45,7 +45,7 @@ class Curve(Protocol):
     #: whether a call takes so long that cubics through the samples stand for it
     costly: bool
 
-    def at(self, x: Array) -> tuple[Array, Array]:
+    def evaluate(self, x: Array) -> tuple[Array, Array]:
         """Return the values at ``x`` and the estimates of their errors, each in the shape of ``x``;
         NaN where the function has none."""
         ...
@@ -74,7 +74,7 @@ class Samples:
         x = np.setdiff1d(places, self.x)
         if not x.size:
             return
-        value, error = self.curve.at(x)
+        value, error = self.curve.evaluate(x)
         legal = np.isfinite(value)
         x, value, error = x[legal], value[legal], error[legal]
         i = np.searchsorted(self.x, x)
@@ -131,8 +131,8 @@ class Search:
             value, error = samples.value[i], samples.error[i]
             function = samples.cubics()
         else:
-            value, error = self.curve.at(places)
-            function = self.curve.at
+            value, error = self.curve.evaluate(places)
+            function = self.curve.evaluate
         off = np.abs(value - self.targets[which])
         real = off <= np.maximum(
             _allowed(error, self.targets[which]), _JUMP * np.ptp(samples.value)
@@ -239,8 +239,8 @@ class Search:
             (at_ends, ends), (which, i, sign) = self._brackets()
             a, b, level = samples.x[i - 1], samples.x[i], self.targets[which]
             if not self.curve.costly:
-                before, places = _first(self.curve.at, a, b, level, sign)
-                value, error = self.curve.at(np.stack((before, places)))
+                before, places = _first(self.curve.evaluate, a, b, level, sign)
+                value, error = self.curve.evaluate(np.stack((before, places)))
                 off = np.abs(value - level) - _allowed(error, level)
                 # a step may leave the target within the error of its other side alone
                 places = np.where((off[0] <= 0.0) & (off[1] > 0.0), before, places)

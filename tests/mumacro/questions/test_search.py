@@ -23,7 +23,7 @@ class Curve:
     def __init__(self, function: Callable[[Array], Array], costly: bool, error: float = ERROR):
         self.function, self.costly, self.error, self.calls = function, costly, error, 0
 
-    def at(self, x: Array) -> tuple[Array, Array]:
+    def evaluate(self, x: Array) -> tuple[Array, Array]:
         self.calls += np.size(x)
         return np.asarray(self.function(x)), np.full(np.shape(x), self.error)
 
