@@ -11,7 +11,7 @@ import numpy as np
 from mumacro.contacts.stiffening import Stiffening
 from mumacro.inputs.cases import fixed_inputs
 from mumacro.inputs.fields import kind_of
-from mumacro.kernel.arrays import Array, Bools
+from mumacro.kernel.arrays import Array, Bools, Places
 from mumacro.questions.input_curve import EVERYWHERE, InputCurve
 from mumacro.questions.search import TINY, last_double
 from mumacro.surrogate import Surrogate
@@ -73,11 +73,11 @@ def border_crossings(
         state = curve.answer(edges).regime == regime
         i = np.flatnonzero(state[1:] != state[:-1])
 
-        def before(x: Array, regime: str = regime, states: Bools = state[i, None]) -> Bools:
-            agrees: Bools = (curve.answer(x).regime == regime) == states
-            return agrees
+        def height(x: Array, rows: Places, regime: str = regime, states: Bools = state[i]) -> Array:
+            agrees = (curve.answer(x).regime == regime) == states[rows]
+            return np.where(agrees, -1.0, 1.0)
 
-        cuts = last_double(before, edges[i], edges[i + 1])
+        cuts = last_double(height, edges[i], edges[i + 1])
         pairs += [*zip(*(cut.tolist() for cut in cuts), strict=True)]
     below, first = np.array(sorted(set(pairs))).reshape(-1, 2).T
     after = curve.answer(first)

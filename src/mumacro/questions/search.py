@@ -11,9 +11,10 @@ samples instead, and the function is called at the roots of the cubics until it 
 All targets share the samples.
 """
 
+import itertools
 from collections.abc import Callable
 from itertools import pairwise
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,7 +35,8 @@ _NARROW = 1e-12  # relative width in which a bracket of a costly function counts
 _JUMP = 1e-6
 _MOST_STEPS = 80
 _SHARPENINGS, _INNER = 12, 8  # how often a turning point is narrowed, and places each time
-_PER_CALL = 512
+_SAFE = 16  # steps of a bracket after which every other one halves it
+_NEAR = 2.0**61  # doubles in a bracket, above which it is halved
 
 Function = Callable[[Array], tuple[Array, Array]]
 
@@ -76,11 +78,11 @@ class Samples:
             return
         value, error = self.curve.evaluate(x)
         legal = np.isfinite(value)
-        x, value, error = x[legal], value[legal], error[legal]
-        i = np.searchsorted(self.x, x)
-        self.x = np.insert(self.x, i, x)
-        self.value = np.insert(self.value, i, value)
-        self.error = np.insert(self.error, i, error)
+        every = np.concatenate((self.x, x[legal]))
+        order = np.argsort(every, kind="stable")
+        self.x = every[order]
+        self.value = np.concatenate((self.value, value[legal]))[order]
+        self.error = np.concatenate((self.error, error[legal]))[order]
 
     def cubics(self) -> Function:
         """Return cubics through the samples, monotone between them, and their errors."""
@@ -287,31 +289,41 @@ class Search:
     def _widths(self, function: Function, which: Places, places: Array) -> tuple[Array, Array]:
         """Return how far below and above places, the roots of the targets ``which``, the function
         is the target within its error."""
-        x = self.samples.x
-        outside = {
-            k: np.abs(self.samples.value - self.targets[k])
-            > _allowed(self.samples.error, self.targets[k])
-            for k in set(which.tolist())
-        }
+        samples, targets = self.samples, self.targets[which]
+        x = samples.x
+
+        def outside(i: Any, target: Any) -> Bools:
+            away = np.abs(samples.value[i] - target)
+            return np.asarray(away > _allowed(samples.error[i], target))
+
+        # the nearest samples that are not the target: nearly always the next ones
+        below = np.searchsorted(x, places) - 1
+        above = np.searchsorted(x, places, side="right")
+        above[above == x.size] = -1
         low, high = np.full(places.size, self.low), np.full(places.size, self.high)
-        below, above = np.full(places.size, -1), np.full(places.size, -1)
-        for n, (k, place) in enumerate(zip(which.tolist(), places.tolist(), strict=True)):
-            i, j = np.searchsorted(x, [place, np.nextafter(place, np.inf)])
-            left, right = np.flatnonzero(outside[k][:i]), np.flatnonzero(outside[k][j:])
+        next_ones = outside(np.stack((below, above)), targets) | (np.stack((below, above)) < 0)
+        for n in np.flatnonzero(~next_ones.all(axis=0)).tolist():
+            i = np.flatnonzero(outside(slice(None), targets[n]))
+            left, right = i[x[i] < places[n]], i[x[i] > places[n]]
             below[n] = left[-1] if left.size else -1
-            above[n] = j + right[0] if right.size else -1
+            above[n] = right[0] if right.size else -1
 
-        def off(q: Array, rows: Places) -> Bools:
-            target = self.targets[which[rows], None]
+        def excess(q: Array, rows: Places) -> Array:
             value, error = function(q)
-            return np.asarray(np.abs(value - target) > _allowed(error, target))
+            target = targets[rows]
+            return np.asarray(np.abs(value - target) - _allowed(error, target))
 
-        on_cusp = off(places[:, None], np.arange(places.size))[:, 0]  # the next double is off, too
+        on_cusp = excess(places, np.arange(places.size)) > 0.0  # the next double is off, too
         low[on_cusp] = high[on_cusp] = places[on_cusp]
         i, j = np.flatnonzero((below >= 0) & ~on_cusp), np.flatnonzero((above >= 0) & ~on_cusp)
-        rows, upward = np.r_[i, j], np.repeat([False, True], [i.size, j.size])[:, None]
+        roots, upward = np.r_[i, j], np.repeat([False, True], [i.size, j.size])
+
+        def height(q: Array, rows: Places) -> Array:
+            off = excess(q, roots[rows])
+            return np.where(upward[rows], off - TINY, -off)  # upward 0 still is the target
+
         first, last = np.r_[x[below[i]], places[j]], np.r_[places[i], x[above[j]]]
-        before, after = last_double(lambda q: off(q, rows) ^ upward, first, last)
+        before, after = last_double(height, first, last)
         low[i], high[j] = after[: i.size], before[i.size :]
         return low, high
 
@@ -327,10 +339,10 @@ def _first(
     """Return the last doubles from ``a`` on before levels are reached, and the first at which they
     are, (n,)."""
 
-    def below(q: Array) -> Bools:
-        return np.asarray(sign[:, None] * (function(q)[0] - level[:, None]) < 0.0)
+    def height(q: Array, rows: Places) -> Array:
+        return sign[rows] * (function(q)[0] - level[rows])
 
-    return last_double(below, a, b)
+    return last_double(height, a, b)
 
 
 def _middle(a: Array, b: Array) -> Array:
@@ -399,24 +411,56 @@ def _double_of(key: NDArray[np.uint64]) -> Array:
 
 
 def last_double(
-    below: Callable[[Array], Bools], low: ArrayLike, high: ArrayLike
+    height: Callable[[Array, Places], Array], low: ArrayLike, high: ArrayLike
 ) -> tuple[Array, Array]:
-    """Return neighbouring doubles (a, b): the last with ``below`` true, the first with it false.
+    """Return neighbouring doubles (a, b), (n,): the last with a height below 0, the first without.
 
-    Cuts the *bits*: doubles are ordered like whole numbers, so this ends at two neighbours,
-    whatever the scale.  ``below`` maps (n, m) values, row i for bracket i, to bool; from true at
-    ``low`` (n,) to false at ``high`` it changes once.
+    ``height`` maps values (m,) in the brackets (m,), counted from 0, to heights (m,); from below 0
+    at ``low`` (n,) it changes its sign once up to ``high``.
+
+    Doubles are ordered like whole numbers, their *bits*, so this ends at two neighbours, whatever
+    the scale.  A bracket is cut where the inverse of a parabola through its ends and the last end
+    that it has left is 0, if that is safe (Chandrupatla's method), and halved otherwise.
     """
-    a, b = np.atleast_1d(_key_of(low)), np.atleast_1d(_key_of(high))
-    rows, one = np.arange(a.size), np.uint64(1)
-    # a call costs as much as some hundred points: few brackets are cut into many parts at once
-    parts = min(max(_PER_CALL // max(a.size, 1), 2), 64)
-    inner, whole = np.arange(1, parts, dtype=np.uint64), np.uint64(parts)
-    while np.any(b - a > one):
-        step, rest = np.divmod(b - a, whole)
-        cuts = a[:, None] + step[:, None] * inner + rest[:, None] * inner // whole
-        last = np.zeros((a.size, 1), dtype=np.bool_)
-        count = np.argmin(np.hstack((below(_double_of(cuts)), last)), axis=1)
-        ends = np.column_stack((a, cuts, b))
-        a, b = ends[rows, count], ends[rows, count + 1]
-    return _double_of(a), _double_of(b)
+    newest, other = np.atleast_1d(_key_of(low)), np.atleast_1d(_key_of(high))
+    i, one = np.arange(newest.size), np.uint64(1)
+    if not i.size:
+        return _double_of(newest), _double_of(other)
+    f, g = height(_double_of(np.concatenate((newest, other))), np.tile(i, 2)).reshape(2, -1)
+    left, h = other.copy(), g.copy()  # no parabola yet
+    for step in itertools.count():
+        width = np.maximum(newest, other) - np.minimum(newest, other)
+        open_ = width > one
+        i = i[open_[i]]
+        if not i.size:
+            break
+        a, b, c, w = newest[i], other[i], left[i], width[i]
+        share = _share(a, b, c, f[i], g[i], h[i])
+        if step > _SAFE and step % 2:
+            share = np.full(i.size, 0.5)
+        share = np.where(a < b, share, 1.0 - share)
+        cut = np.minimum(a, b) + np.clip((share * w).astype(np.uint64), one, w - one)
+        f_cut = height(_double_of(cut), i)
+        same = (f_cut < 0.0) == (f[i] < 0.0)
+        left[i], h[i] = np.where(same, a, b), np.where(same, f[i], g[i])
+        other[i], g[i] = np.where(same, b, a), np.where(same, g[i], f[i])
+        newest[i], f[i] = cut, f_cut
+    return _double_of(np.minimum(newest, other)), _double_of(np.maximum(newest, other))
+
+
+def _share(
+    a: NDArray[np.uint64],
+    b: NDArray[np.uint64],
+    c: NDArray[np.uint64],
+    f: Array,
+    g: Array,
+    h: Array,
+) -> Array:
+    """Return where to cut brackets from the newest end ``a`` to ``b``, as a share of the way; ``c``
+    is the end that was left, ``f``, ``g`` and ``h`` are the heights, all (n,)."""
+    with np.errstate(all="ignore"):
+        to_b, c_to_b = ((b - x).view(np.int64).astype(np.float64) for x in (a, c))
+        xi, phi = to_b / c_to_b, (f - g) / (h - g)
+        safe = (phi * phi < xi) & ((1.0 - phi) ** 2 < 1.0 - xi) & (np.abs(to_b) < _NEAR)
+        parabola = f / (g - f) * h / (g - h) + (to_b - c_to_b) / to_b * f / (h - f) * g / (h - g)
+        return np.where(safe, parabola, 0.5)

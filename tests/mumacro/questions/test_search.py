@@ -1,5 +1,6 @@
 """The search for roots: none is missed, ranges of roots are one, for cheap and costly functions."""
 
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate, solve_for, solve_motion
-from mumacro.kernel.arrays import Array
+from mumacro.kernel.arrays import Array, Places
 from mumacro.questions.search import TINY, Search, last_double, samples, turning_points
 from mumacro.questions.solutions import Reach
 from tests.support.cases import CASE, without
@@ -140,11 +141,15 @@ def test_turning_points_are_those_beyond_the_error() -> None:
 def test_neighbouring_doubles_are_found_at_any_scale_and_across_zero() -> None:
     expected = np.array([-1e300, -2.5, 5e-324, 1e-300, 0.1, math.pi, 1e300])
 
-    def below(x: Any) -> Any:
-        return x < expected[:, None]
+    def step(x: Array, i: Places) -> Array:
+        return np.where(x < expected[i], -1.0, 1.0)
 
-    for low in (np.full(7, -1.7e308), np.minimum(expected * 2.0, 0.0)):
-        a, b = last_double(below, low, np.full(7, 1.7976931348623157e308))
+    def course(x: Array, i: Places) -> Array:
+        return np.where(x < expected[i], -1.0, np.abs(np.cbrt(x) - np.cbrt(expected[i])))
+
+    lows = np.full(7, -1.7e308), np.minimum(expected * 2.0, 0.0)
+    for height, low in itertools.product((step, course), lows):
+        a, b = last_double(height, low, np.full(7, 1.7976931348623157e308))
         assert b.tolist() == expected.tolist()
         assert a.tolist() == np.nextafter(expected, -np.inf).tolist()
 
