@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 import mumacro
-from mumacro.motions.solve_motion import UNKNOWNS, Curve
+from mumacro.motions.solve_motion import UNKNOWNS, MotionCurve
 from mumacro.plotting import INK, Panels, head, save
 
 PROBLEMS, FINE = 1000, 2000
@@ -68,7 +68,7 @@ def search(share: float = 1.0) -> str:
         unknown, case = problem(rng)
         x = mumacro.solve_motion(unknown, 1e9, **case).samples[0]  # how its range is spread
         fine = np.interp(np.linspace(0.0, 1.0, FINE), np.linspace(0.0, 1.0, x.size), x)
-        mean, _ = Curve(unknown, "mu_macro", case).evaluate(fine)
+        mean, _ = MotionCurve(unknown, "mu_macro", case).evaluate(fine)
         target = float(np.nanquantile(mean, rng.uniform(0.1, 0.9)))
         start = time.perf_counter()
         solution = mumacro.solve_motion(unknown, target, **case)

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator
 
 from mumacro.inputs.cases import DEVIATIONS, KIND
-from mumacro.inputs.fields import ContactName, DirectionName, Kind, kind_of, unit_of
+from mumacro.inputs.fields import ContactName, DirectionName, Kind, kind_of
+from mumacro.inputs.units import unit_of
 from mumacro.outputs import OUTPUTS
 
 from ..understood import UNDERSTOOD

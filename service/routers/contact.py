@@ -11,7 +11,7 @@ import mumacro
 from mumacro.contacts.geometries import contact_of
 from mumacro.errors import InputError, TextError
 from mumacro.fits.measured_points import read_points, unknowns_beside
-from mumacro.inputs.text_tables import Most, Table
+from mumacro.inputs.text_tables import Most, TableOfNumbers
 from mumacro.inputs.workbooks import BEGIN as WORKBOOK
 
 from .. import API_VERSION
@@ -65,7 +65,7 @@ async def post_fit(request: Request, measured: FitRequest) -> Response:
     return await compute(request, answer)
 
 
-def _points(member: str, data: bytes, measured: FitRequest) -> Table:
+def _points(member: str, data: bytes, measured: FitRequest) -> TableOfNumbers:
     """Return the points of a table; a request has what is wrong with its lines at ``member``."""
     try:
         if data.startswith(WORKBOOK):  # a few kB of it may unpack to any size
@@ -76,7 +76,7 @@ def _points(member: str, data: bytes, measured: FitRequest) -> Table:
         refuse([FieldFault.of(member, fault) for fault in faults[:_FAULTS]])
 
 
-def _as_read(points: Table) -> dict[str, Any]:
+def _as_read(points: TableOfNumbers) -> dict[str, Any]:
     return {
         "columns": points.in_own_units,
         "units": points.units,
@@ -88,7 +88,10 @@ def _as_read(points: Table) -> dict[str, Any]:
 
 
 def _fitted(
-    table: LoadedTable, measured: FitRequest, columns: Mapping[str, Any], points: Table | None
+    table: LoadedTable,
+    measured: FitRequest,
+    columns: Mapping[str, Any],
+    points: TableOfNumbers | None,
 ) -> dict[str, Any]:
     words: Any = measured.kind.names
     unknowns: Sequence[str] = measured.unknowns

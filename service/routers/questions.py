@@ -14,7 +14,7 @@ from mumacro.contacts.stiffening import Stiffening
 from mumacro.errors import InputError
 from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import Cases, ends_in, named
-from mumacro.inputs.fields import unit_of
+from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.outputs import MEMBERS
 from mumacro.outputs.evaluation import chosen

@@ -267,7 +267,7 @@ class Answer(Result, Generic[Number]):
             case["k"] = [float(end[0]) for end in cases.ends]
         low, high = (getattr(self, name, None) for name in BAND)
         band = "" if low is None or high is None else f" ({low:.4g} to {high:.4g})"
-        words = plotting.in_words(case, cases.kind.names)
+        words = plotting.case_title(case, cases.kind.names)
         return rf"$\mu_\mathrm{{macro}}$ = {self.mu_macro:.4g}{band}; {words}"
 
     def _on_map(self) -> plotting.Marks:

@@ -16,7 +16,7 @@ from mumacro.errors import InputError
 from mumacro.inputs.carried import labelled_in_si, library
 from mumacro.inputs.cases import Cases, library_of
 from mumacro.inputs.columns import is_column, read_column
-from mumacro.inputs.fields import QUANTITY_OF
+from mumacro.inputs.fields import quantity_of
 from mumacro.notes import Note, add
 from mumacro.outputs import MEMBERS
 from mumacro.outputs.evaluation import chosen
@@ -184,8 +184,7 @@ def _of_chunks(
             bound = "a Dask array: .to_dask_array(lengths=True)"
             raise InputError(name, type(x).__name__, bound)
         if library_of(x):
-            quantity = QUANTITY_OF.get(name.removeprefix("std_"), "ratio")
-            arrays[name] = labelled_in_si(name, x, quantity)
+            arrays[name] = labelled_in_si(name, x, quantity_of(name))
         elif is_column(x):
             arrays[name] = read_column(name, x).si
         else:

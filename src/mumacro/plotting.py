@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro.errors import InputError, MumacroError, missing
-from mumacro.inputs.fields import AMPLITUDE, RAD_PER_CYCLE, unit_of
-from mumacro.inputs.units import suited
+from mumacro.inputs.fields import AMPLITUDE, RAD_PER_CYCLE
+from mumacro.inputs.units import suit_unit, unit_of
 from mumacro.kernel.arrays import Array
-from mumacro.results import Unit, tidy_zeros
+from mumacro.results import format_number, tidy_zeros
 
 ENDINGS = (".png", ".svg", ".pdf")
 #: the map: v~ from deep in creep to fast sliding [-], and y~ [-]; that of a normal force is below
@@ -99,7 +99,7 @@ OF_CYCLE = Panels(columns=2, size=(10.0, 5.0))
 OF_FIT = Panels(rows=2, size=(6.4, 5.6), heights=(3.0, 1.0))
 
 
-class Curve(NamedTuple):
+class MeasuredCurve(NamedTuple):
     """Measured points at one set of the other inputs, and the fit there."""
 
     label: str  #: the inputs in which the set differs from others
@@ -179,11 +179,11 @@ def save(
 # --- words ----------------------------------------------------------------------------------------
 
 
-def in_words(case: Mapping[str, Any], kind: Mapping[str, str] | None = None) -> str:
+def case_title(case: Mapping[str, Any], kind: Mapping[str, str] | None = None) -> str:
     """Return a case as the title of a picture: the inputs [SI], numbers or (low, high), and what it
     is.
 
-    >>> in_words({"mu0": 0.3, "Fz": 10.0, "k": 1e6}, {"contact": "ball", "direction": "along"})
+    >>> case_title({"mu0": 0.3, "Fz": 10.0, "k": 1e6}, {"contact": "ball", "direction": "along"})
     '$\\\\mu_0$ = 0.3, $F_z$ = 10 N, $k$ = 1 N/µm; ball, along'
     """
     inputs = ", ".join(quantity_words(name, value) for name, value in case.items())
@@ -197,14 +197,14 @@ def quantity_words(name: str, value: Any) -> str:
         return f"{_SYMBOLS[name]} rigid"
     if name == "omega":
         name, ends = "f", [end / RAD_PER_CYCLE for end in ends]
-    return f"{_SYMBOLS[name]} = {_with_unit(unit_of(name), *ends)}"
+    return f"{_SYMBOLS[name]} = {_in_suited_unit(unit_of(name), *ends)}"
 
 
-def _with_unit(si: str, *values: float) -> str:
+def _in_suited_unit(si: str, *values: float) -> str:
     """Return numbers in an SI unit, in the one that suits the last of them."""
-    unit = Unit.suiting(si, values[-1])
-    numbers = " to ".join(tidy_zeros(unit.shown(value, 4)) for value in values)
-    unit_text = unit.name.replace("um", "µm").replace("uN", "µN").removeprefix("-")
+    unit = suit_unit(si, values[-1])
+    numbers = " to ".join(tidy_zeros(format_number(value, unit, 4)) for value in values)
+    unit_text = unit.symbol.replace("um", "µm").replace("uN", "µN").removeprefix("-")
     return f"{numbers} {unit_text}".rstrip()
 
 
@@ -223,7 +223,7 @@ def oscillation_words(symbol: str, unit: str, terms: Iterable[tuple[int, float, 
         # whole turns say nothing
         phase = math.remainder(degrees, 360.0)
         at = f" at {phase:.4g}°" if abs(phase) > 1e-9 else ""
-        parts.append(f"{order}{_with_unit(unit, amplitude)}{at}")
+        parts.append(f"{order}{_in_suited_unit(unit, amplitude)}{at}")
     return f"{symbol}: {', '.join(parts)}" if parts else ""
 
 
@@ -368,7 +368,7 @@ def plot_roots(
     return ax
 
 
-def plot_fit(along: str, curves: Sequence[Curve], title: str, ax: Any = None) -> Any:
+def plot_fit(along: str, curves: Sequence[MeasuredCurve], title: str, ax: Any = None) -> Any:
     """Return measured points, the fit and its band over the input ``along``, and below them the
     residuals; more than 8 curves have no legend.
 
@@ -700,7 +700,7 @@ def plot_cycle(
 def _draw_path(path: Any, x: Array, y: Array, Fx: Array, Fy: Array) -> None:
     """Draw the path of the upper point on its axes, with the force at 16 moments."""
     extent = max(np.ptp(x), np.ptp(y))
-    unit, scale = suited("m", float(extent))
+    unit, scale = suit_unit("m", float(extent))
     x, y = x * scale.over / scale.times, y * scale.over / scale.times
     path.plot(x, y, color=_ink(), label="upper point")
     path.plot(x[0], y[0], "o", color="C0", label="start of the period")

@@ -9,13 +9,13 @@ import html
 import math
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mumacro.errors import MumacroError
-from mumacro.inputs.fields import unit_of
-from mumacro.inputs.units import Scale, scale_of, suited
+from mumacro.inputs.fields import quantity_of
+from mumacro.inputs.units import Unit, parse_unit, suit_unit, unit_of
 from mumacro.notes import REMARK, WARNING, Note, Remark, texts_of
 
 Rows = list[tuple[str, ...]]  # of texts, as a table shows them
@@ -181,46 +181,40 @@ def known(value: float, digits: int, error: float = 0.0, deviation: float = 0.0)
     return f"{rounded:#.{count}g}".removesuffix(".")
 
 
-class Unit(NamedTuple):
-    """The unit in which a number in SI is shown, by the command, in notebooks and in pictures."""
+def choose_unit(
+    name: str, value: float, typed: Mapping[str, str], digits: int | None = None
+) -> Unit:
+    """Return the unit in which an input is shown: the one that was typed, or the one that suits a
+    value [SI]; with a number of ``digits``, the SI unit.
 
-    name: str
-    scale: Scale
+    >>> choose_unit("y0", 2e-6, {}).symbol, choose_unit("y0", 2e-6, {"y0": "mm"}).symbol
+    ('um', 'mm')
+    """
+    if digits is not None:
+        return Unit(unit_of(name))
+    parsed = parse_unit(quantity_of(name), typed[name]) if name in typed else None
+    return parsed or suit_unit(unit_of(name), value)
 
-    @classmethod
-    def suiting(cls, si: str, value: float, digits: int | None = None) -> "Unit":
-        """Return the unit that suits a value in an SI unit; with a number of ``digits``, that SI
-        unit.
 
-        >>> Unit.suiting("m", 2.4547623e-6).text(2.4547623e-6, 4)
-        '2.455 um'
-        >>> Unit.suiting("m", 2.4547623e-6, digits=8).text(2.4547623e-6, 4, 8)
-        '2.4547623e-06 m'
-        """
-        return cls(*suited(si, value)) if digits is None else cls(si, Scale())
+def format_number(
+    value: float, unit: Unit, count: int, digits: int | None = None, error: float = 0.0
+) -> str:
+    """Return a value [SI] as a number of a unit, with ``count`` digits, less those that its
+    ``error`` leaves unknown; or with ``digits``."""
+    if digits is not None:
+        return f"{value:.{digits}g}"
+    return known(unit.scale.of_si(value), count, unit.scale.of_si(error))
 
-    @classmethod
-    def of(cls, name: str, value: float, units: Mapping[str, str], digits: int | None) -> "Unit":
-        """Return that of an input: the one that was typed, or the one that suits a value [SI]; with
-        a number of ``digits``, the SI unit."""
-        if digits is None and name in units:
-            return cls(units[name], scale_of(name, units[name]) or Scale())
-        return cls.suiting(unit_of(name), value, digits)
 
-    def head(self, name: str) -> str:
-        """Return the header of a column."""
-        return f"{name} [{self.name}]"
+def format_quantity(value: float, unit: Unit, count: int, digits: int | None = None) -> str:
+    """Return the same with the unit.
 
-    def shown(self, value: float, count: int, digits: int | None = None, error: float = 0.0) -> str:
-        """Return a value [SI] with ``count`` digits, those that its ``error`` leaves; or with
-        ``digits``."""
-        if digits is not None:
-            return f"{value:.{digits}g}"
-        return known(self.scale.of_si(value), count, self.scale.of_si(error))
-
-    def text(self, value: float, count: int, digits: int | None = None) -> str:
-        """Return the same with the unit."""
-        return f"{self.shown(value, count, digits)} {self.name}"
+    >>> format_quantity(2.4547623e-6, suit_unit("m", 2.4547623e-6), 4)
+    '2.455 um'
+    >>> format_quantity(2.4547623e-6, Unit("m"), 4, digits=8)
+    '2.4547623e-06 m'
+    """
+    return f"{format_number(value, unit, count, digits)} {unit.symbol}"
 
 
 def tidy_zeros(text: str) -> str:

@@ -616,7 +616,7 @@ class Surrogate:
     ) -> Answer[Any]:
         """Return :meth:`evaluate` of cases in their one form, with outputs of
         ``mumacro.outputs.evaluation.chosen``; ``groups`` keeps v~, y~ and l0, too."""
-        answer = evaluation.answer(self.tabulated, cases, outputs, groups)
+        answer = evaluation.evaluate_cases(self.tabulated, cases, outputs, groups)
         answer._surrogate = self
         return answer
 

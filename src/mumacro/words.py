@@ -5,10 +5,10 @@ from typing import Any
 
 from mumacro.answer import Answer
 from mumacro.inputs.fields import LIKE, PER_UNIT, Kind
-from mumacro.inputs.units import suited
+from mumacro.inputs.units import Unit, suit_unit
 from mumacro.notes import Note
 from mumacro.outputs import MEMBERS
-from mumacro.results import Rows, Unit, known, tidy_zeros
+from mumacro.results import Rows, choose_unit, format_number, known, tidy_zeros
 from mumacro.validity import notes_of
 
 REGIMES = {
@@ -48,9 +48,9 @@ def in_words(note: Note, kind: Kind, case: Mapping[str, Any]) -> Note:
     >>> in_words(Note("assumes", "...", "one spring"), kind_of("ball"), {"k": 1.0}).row
     'a ball'
     """
-    unit, scale = suited("N/m", case["k"])
-    k = scale.of_si(case["k"])
-    advice = f"give k={0.9 * k:.3g}..{1.1 * k:.3g}{unit}"
+    unit = suit_unit("N/m", case["k"])
+    k = unit.scale.of_si(case["k"])
+    advice = f"give k={0.9 * k:.3g}..{1.1 * k:.3g}{unit.symbol}"
     row = _CALLED.get((note.row, kind.names["contact"]), note.row)
     return note._replace(row=row, text=note.text.replace("give k as an interval", advice))
 
@@ -61,8 +61,8 @@ _UNIT_OF = {"limits.v0_crit": "v0", "groups.l0": "y0"}
 
 def _stiffness(k: float, shown: int | None, units: Mapping[str, str]) -> str:
     """Return a stiffness that was given, or the middle of an interval."""
-    unit = Unit.of("k", k, units, shown)
-    return f"{tidy_zeros(unit.shown(k, 6, shown))} {unit.name}"
+    unit = choose_unit("k", k, units, shown)
+    return f"{tidy_zeros(format_number(k, unit, 6, shown))} {unit.symbol}"
 
 
 def _rows_of(
@@ -101,20 +101,20 @@ def _rows_of(
         meaning = f"standard deviation; {parts}" if parts else "standard deviation"
         rows[0] = ("mu_macro", f"{rows[0][1]} ± {deviation}", "[-]", meaning)
     for name, slope in (answer.gradient or {}).items():
-        unit = PER_UNIT[LIKE.get(name, name)]
+        per = PER_UNIT[LIKE.get(name, name)]
         error = answer.gradient_bound[name]
-        rows.append((f"slope {name}", number(slope, error), f"[{unit}]", f"d mu_macro / d {name}"))
+        rows.append((f"slope {name}", number(slope, error), f"[{per}]", f"d mu_macro / d {name}"))
     for path, value in answer.outputs.items():
         if path.partition(".")[0] in _SHOWN or "_bound" in path:
             continue
         name, dot, member = path.partition(".")
         error = answer.outputs.get(f"{name}_bound{dot}{member}", 0.0)
         typed = _UNIT_OF.get(path, "")
-        in_unit = (
-            Unit.of(typed, value, units, shown)
-            if typed in units
-            else Unit.suiting(MEMBERS[path].unit, value, shown)
-        )
-        text = in_unit.shown(value, count, shown, error)
-        rows.append((path, text, f"[{in_unit.name}]", MEMBERS[path].meaning))
+        si = MEMBERS[path].unit
+        if typed in units:
+            unit = choose_unit(typed, value, units, shown)
+        else:
+            unit = suit_unit(si, value) if shown is None else Unit(si)
+        text = format_number(value, unit, count, shown, error)
+        rows.append((path, text, f"[{unit.symbol}]", MEMBERS[path].meaning))
     return rows

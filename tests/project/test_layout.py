@@ -74,3 +74,23 @@ def test_benchmarks_fuzz_and_tests_share_tests_support_alone(folder: str, path: 
     assert [
         name for name in ours if not f"{name}.".startswith(tuple(f"{x}." for x in SHARED[folder]))
     ] == []
+
+
+def test_no_two_modules_or_functions_of_the_library_have_one_name() -> None:
+    """A command and the question that it asks have one name; every command has ``run``, the
+    programs ``main``."""
+    modules: dict[str, list[str]] = {}
+    names: dict[str, list[str]] = {}
+    library = ROOT / "src" / "mumacro"
+    for path in sorted(library.rglob("*.py")):
+        place = path.relative_to(library).as_posix()
+        if not path.stem.startswith("_") and path.parent.name != "cli":
+            modules.setdefault(path.stem, []).append(place)
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if not isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+                continue
+            if not node.name.startswith("_") and node.name not in ("run", "main"):
+                names.setdefault(node.name, []).append(place)
+    assert len(names) > 300
+    assert {name: places for name, places in modules.items() if len(places) > 1} == {}
+    assert {name: places for name, places in names.items() if len(places) > 1} == {}

@@ -26,7 +26,7 @@ from mumacro.table.atlas import (
     Y_TAIL,
     Axis,
     Chart,
-    Quantity,
+    TabulatedQuantity,
 )
 from mumacro.table.blocks import Block, BorderPiece
 from mumacro.table.polynomials import Border, block_rows
@@ -177,7 +177,9 @@ def _asked(kind: Kind, v: Array, y: Array) -> tuple[Array, Array]:
     return (MIDDLE * v / MIDDLE, MIDDLE * y / MIDDLE) if kind == BALL else (v, y)
 
 
-def with_slopes(table: Surrogate, quantity: Quantity, v: Array, y: Array) -> NDArray[np.bool_]:
+def with_slopes(
+    table: Surrogate, quantity: TabulatedQuantity, v: Array, y: Array
+) -> NDArray[np.bool_]:
     """Where slopes are compared: of what is not smooth at the border, away from it."""
     if quantity.smooth_at_border:
         return np.full(v.shape, True)

@@ -26,7 +26,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from mumacro.inputs.fields import AMPLITUDE, CONTACTS, DIRECTIONS, INPUTS, unit_of
+from mumacro.inputs.fields import AMPLITUDE, CONTACTS, DIRECTIONS, INPUTS
+from mumacro.inputs.units import unit_of
 from mumacro.table import atlas
 from mumacro.table.blocks import Table
 from mumacro.version import __version__

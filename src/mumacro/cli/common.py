@@ -33,16 +33,15 @@ from mumacro.inputs.fields import (
     Kind,
     in_help,
     kind_of,
-    unit_of,
 )
 from mumacro.inputs.layout import SEPARATORS, Dialect
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.numbers import THOUSANDS, check_signs
-from mumacro.inputs.units import belongs_to_value
+from mumacro.inputs.units import belongs_to_value, unit_of
 from mumacro.notes import Note
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import names_in
-from mumacro.results import Unit, tidy_zeros
+from mumacro.results import choose_unit, format_number, tidy_zeros
 from mumacro.surrogate import Surrogate
 
 ABOUT_INPUTS = f"""\
@@ -417,11 +416,11 @@ def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
     return {name: float(x) if isinstance(x, np.ndarray) else x for name, x in one_k.items()}
 
 
-def units_in(words: Sequence[str], **more: Sequence[str]) -> dict[str, str]:
+def typed_units(words: Sequence[str], **more: Sequence[str]) -> dict[str, str]:
     """Return the units that were typed, by input; ``more`` are other texts of an input, such as the
     ends of a range, which come first.
 
-    >>> units_in(["mu0=0.3 Fz=10N", "k=1 N/um v0=1mm/s"], v0=["0.1m/s", "1"])
+    >>> typed_units(["mu0=0.3 Fz=10N", "k=1 N/um v0=1mm/s"], v0=["0.1m/s", "1"])
     {'v0': 'm/s', 'Fz': 'N', 'k': 'N/um'}
     """
     pairs = [(name, text) for name, texts in more.items() for text in texts]
@@ -444,11 +443,11 @@ def case_line(case: Mapping[str, Any], units: Mapping[str, str], kind: Kind, *mo
         if math.isinf(ends[-1]):
             parts.append("k rigid")
             continue
-        unit = Unit.of(field, float(ends[-1]), units, None)
+        unit = choose_unit(field, float(ends[-1]), units)
         deviation = [case[f"std_{name}"]] if f"std_{name}" in case else []
-        shown = [tidy_zeros(unit.shown(float(x), 6, None)) for x in (*ends, *deviation)]
+        shown = [tidy_zeros(format_number(float(x), unit, 6)) for x in (*ends, *deviation)]
         numbers = (" ± " if deviation else " to ").join(shown)
-        parts.append(f"{field} = {numbers} {unit.name}".removesuffix(" -"))
+        parts.append(f"{field} = {numbers} {unit.symbol}".removesuffix(" -"))
     return "; ".join([", ".join([*parts, *more]), ", ".join(kind.names.values())])
 
 

@@ -22,7 +22,8 @@ from mumacro.errors import InputError, TextError
 from mumacro.fits.fit import fit
 from mumacro.fits.fitted import Fit
 from mumacro.fits.measured_points import STD, UNKNOWNS, read_points, unknowns_beside
-from mumacro.inputs.fields import AMPLITUDE, unit_of
+from mumacro.inputs.fields import AMPLITUDE
+from mumacro.inputs.units import unit_of
 from mumacro.surrogate import Surrogate
 from mumacro.validity import digits
 

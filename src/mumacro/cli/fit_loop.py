@@ -15,7 +15,7 @@ from mumacro.fits.loop_fitted import LoopFit
 from mumacro.inputs.case import read_one
 from mumacro.inputs.fields import CONTACTS
 from mumacro.inputs.layout import ColumnNames
-from mumacro.inputs.text_tables import read_table
+from mumacro.inputs.text_tables import read_numbers
 
 EXAMPLE = "mumacro fit-loop loop.csv Fz=10N --displacement x --force Ft -o loop.png"
 _ABOUT = f"""\
@@ -73,7 +73,7 @@ def run(words: Sequence[str]) -> str:
     column_names = ColumnNames(like, [(name,) for name in names.values()])
     source = sys.stdin.buffer.read() if options.loop == "-" else Path(options.loop)
     try:
-        table = read_table(source, column_names, common.dialect_in(options))
+        table = read_numbers(source, column_names, common.dialect_in(options))
     except TextError as error:
         raise ImpossibleError(f"{options.loop}: {error}") from None
     columns = {what: table.columns[name] for what, name in names.items()}

@@ -15,9 +15,9 @@ from mumacro.cli.common import (
     read_case,
 )
 from mumacro.inputs.case import read_one
-from mumacro.inputs.fields import unit_of
+from mumacro.inputs.units import Unit, unit_of
 from mumacro.questions.law import law as friction_law
-from mumacro.results import Unit, known, tidy_zeros
+from mumacro.results import choose_unit, format_number, format_quantity, known, tidy_zeros
 
 EXAMPLE = 'mumacro law "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz" --along v0 0.1mm/s 1m/s'
 
@@ -67,11 +67,11 @@ def run(words: Sequence[str]) -> str:
         return as_json({**law.to_dict(), "table": common.table_members(surrogate)})
     middle = float(law.values[law.values.size // 2])
     count = law.digits if options.digits is None else options.digits
-    units = common.units_in(options.words, **{along: ends})
-    unit = Unit.of(along, middle, units, options.digits)
+    units = common.typed_units(options.words, **{along: ends})
+    unit = choose_unit(along, middle, units, options.digits)
     of_k = ", for the geometric middle of k" if law.k_ends else ""
     notes = [
-        f"{c.name} at {along} = {unit.shown(c.value, count, options.digits)} {unit.name}{of_k}"
+        f"{c.name} at {along} = {format_quantity(c.value, unit, count, options.digits)}{of_k}"
         for c in law.border
     ]
     notes += common.note_lines(law.notes)
@@ -81,7 +81,7 @@ def run(words: Sequence[str]) -> str:
         return "\n".join([common.write_result(options.out, in_si, law.plot), *notes])
     column_units = {along: unit}
     if law.stiffening is not None:
-        column_units["k"] = Unit.of("k", float(law.inputs["k"].max()), units, options.digits)
+        column_units["k"] = choose_unit("k", float(law.inputs["k"].max()), units, options.digits)
     table = _table(columns, column_units, count, options.digits)
     return "\n".join([common.case_line(case, units, kind), table, *notes])
 
@@ -91,7 +91,7 @@ def _table(
 ) -> str:
     """Return the columns of a law as text, those with a unit in it; ``source`` is left out."""
     cells = {
-        units[name].head(name) if name in units else name: [
+        f"{name} [{units[name].symbol}]" if name in units else name: [
             _cell(x, name, units.get(name), count, digits, error)
             for x, error in zip(column, columns["error_bound"], strict=True)
         ]
@@ -110,7 +110,7 @@ def _cell(
     if math.isnan(value):
         return "-"
     if unit is not None:
-        return tidy_zeros(unit.shown(value, 6, digits))
+        return tidy_zeros(format_number(value, unit, 6, digits))
     if name == "error_bound":
         return f"{value:.{digits or 2}g}"
     if digits is not None:

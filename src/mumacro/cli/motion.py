@@ -8,10 +8,11 @@ from mumacro import plotting
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns, read_case
 from mumacro.inputs.fields import CONTACTS, in_help
+from mumacro.inputs.units import Unit, suit_unit
 from mumacro.motions.motion import NUMBERS, PARTS, Motion
 from mumacro.motions.motion import motion as steady_cycle
 from mumacro.motions.oscillation import read_oscillation
-from mumacro.results import Unit
+from mumacro.results import format_number
 
 EXAMPLE = 'mumacro motion "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=1cm/s" --x 1um@90deg --y 2um'
 _INPUTS = f"""\
@@ -95,5 +96,5 @@ def _shown(
     if name == "power_drive" and motion.mu_macro:  # mu_macro Fz v0
         share[name] = abs(value / motion.mu_macro)
     error = motion.error_estimate * share.get(name, 0.0)
-    shown = Unit.suiting(unit, value, digits)
-    return shown.shown(value, 6, digits, error), f"[{shown.name}]"
+    shown = suit_unit(unit, value) if digits is None else Unit(unit)
+    return format_number(value, shown, 6, digits, error), f"[{shown.symbol}]"

@@ -33,7 +33,7 @@ def run(words: Sequence[str], description: str) -> str:
     if arguments.json:
         said = {"model": rows_of(answer)} if arguments.model else {}
         return as_json({**answer.to_dict(), **said, "table": common.table_members(surrogate)})
-    units = common.units_in(arguments.words)
+    units = common.typed_units(arguments.words)
     rows, notes, error = words_of_one_case(answer, arguments.digits, units)
     line = common.case_line(case, units, kind)
     return "\n".join([line, in_columns(rows), *([in_columns(notes)] if notes else []), error])

@@ -19,9 +19,10 @@ from mumacro.cli.common import (
 from mumacro.inputs.case import read_one
 from mumacro.inputs.fields import AMPLITUDE, ENDS, NAMES
 from mumacro.inputs.names import suggestion
+from mumacro.inputs.units import Unit
 from mumacro.motions.solve_motion import UNKNOWNS
 from mumacro.questions.solve_for import Root, TableSolution, solve_for
-from mumacro.results import Unit, tidy_zeros
+from mumacro.results import choose_unit, format_number, tidy_zeros
 
 EXAMPLE = 'mumacro solve-for y0 "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s" --target 0.15'
 _TARGET = ": give mu_macro, such as 0.15 or 15%, or with --ratio mu_macro/mu0"
@@ -113,11 +114,11 @@ def run(words: Sequence[str]) -> str:
         in_si = [(*((k,) if solution.ends else ()), *root) for k, root in rows]
         columns = dict(zip(heads, zip(*in_si, strict=True), strict=True))
         return common.write_result(options.out, columns, solution.plot)
-    units = common.units_in(options.words, **{unknown: options.between or ()})
+    units = common.typed_units(options.words, **{unknown: options.between or ()})
     first_root = rows[0][1].value
     count = solution.digits if options.digits is None else options.digits
-    unit = Unit.of(unknown, first_root, units, options.digits)
-    k_unit = Unit.of("k", rows[-1][0], units, options.digits) if solution.ends else None
+    unit = choose_unit(unknown, first_root, units, options.digits)
+    k_unit = choose_unit("k", rows[-1][0], units, options.digits) if solution.ends else None
     table = _table(unknown, rows, unit, k_unit, count, options.digits)
     without = [
         f"no {unknown} gives that for k = {k:.6g} N/m"
@@ -153,10 +154,10 @@ def _table(
     digits: int | None,
 ) -> str:
     """Return the roots as text, with their k where that is an interval."""
-    table = [_heads(unit.head(unknown), k_unit.head("k") if k_unit else None)]
+    table = [_heads(f"{unknown} [{unit.symbol}]", k_unit and f"k [{k_unit.symbol}]")]
     for k, root in rows:
-        of_k = [tidy_zeros(k_unit.shown(k, 6, digits))] if k_unit else []
-        values = [unit.shown(x, count, digits) for x in (root.value, root.low, root.high)]
+        of_k = [tidy_zeros(format_number(k, k_unit, 6, digits))] if k_unit else []
+        values = [format_number(x, unit, count, digits) for x in (root.value, root.low, root.high)]
         table.append([*of_k, *values, f"{root.mu_macro:.{count}g}", root.regime])
     return in_columns(table)
 

@@ -8,13 +8,12 @@ from typing import Any
 from mumacro.cli import common
 from mumacro.cli.common import ImpossibleError, UsageError, as_json, in_columns, read_case
 from mumacro.inputs.case import read
-from mumacro.inputs.fields import kind_of
-from mumacro.inputs.units import Scale, scale_in
+from mumacro.inputs.fields import kind_of, quantity_of
+from mumacro.inputs.units import Unit, parse_unit, suit_unit
 from mumacro.motions.motion import PARTS
 from mumacro.motions.oscillation import read_oscillation
 from mumacro.motions.solve_motion import MotionSolution, solve_motion
-from mumacro.questions.solutions import quantity_of_unknown
-from mumacro.results import Unit, known, tidy_zeros
+from mumacro.results import format_number, known, tidy_zeros
 
 EXAMPLE = 'mumacro solve-for v0 "mu0=0.3 Fz=10N k=0.1N/um f=50Hz" --x 0.1mm --normal 8N@-90deg'
 
@@ -61,12 +60,12 @@ def run(options: argparse.Namespace, within: list[str] | None) -> str:
         heads = [f"{solution.unknown} [{solution.unit}]", "between", "and", "mu_macro [-]"]
         columns = dict(zip(heads, zip(*(root[:4] for root in roots), strict=True), strict=True))
         return common.write_result(options.out, columns, solution.plot)
-    unit = _unit_of(solution, within or (), options.digits)
-    table = [[unit.head(solution.unknown), "between", "and", "mu_macro [-]"]]
+    unit = _unit_of_roots(solution, within or (), options.digits)
+    table = [[f"{solution.unknown} [{unit.symbol}]", "between", "and", "mu_macro [-]"]]
     for root in roots:
         width = root.high - root.low
-        cells = [unit.shown(root.value, 6, options.digits, width)]
-        cells += [unit.shown(x, 6, options.digits) for x in (root.low, root.high)]
+        cells = [format_number(root.value, unit, 6, options.digits, width)]
+        cells += [format_number(x, unit, 6, options.digits) for x in (root.low, root.high)]
         mean = (
             f"{root.mean:.{options.digits}g}"
             if options.digits
@@ -74,24 +73,23 @@ def run(options: argparse.Namespace, within: list[str] | None) -> str:
         )
         table.append([*cells, mean])
     oscillations = [f"{name} = {text}" for name, text in texts]
-    units = common.units_in(options.words)
+    units = common.typed_units(options.words)
     first = common.case_line(case, units, kind_of(options.contact), *oscillations)
     said = filter(None, [solution.reason()])
     return "\n".join([first.removesuffix(", across"), in_columns(table), *said])
 
 
-def _unit_of(solution: MotionSolution, typed: Sequence[str], digits: int | None) -> Unit:
+def _unit_of_roots(solution: MotionSolution, typed: Sequence[str], digits: int | None) -> Unit:
     """Return the unit in which the roots are printed."""
-    unit, (first, *_) = solution.unit, solution.roots[0]
+    si, (first, *_) = solution.unit, solution.roots[0]
     if digits is not None:
-        return Unit(unit, Scale())
-    quantity = quantity_of_unknown(solution.unknown)
+        return Unit(si)
+    quantity = quantity_of(solution.unknown)
     for text in typed:
-        name = read(solution.unknown, text, quantity).unit
-        scale = None if name is None else scale_in(quantity, name)
-        if name is not None and scale is not None:
-            return Unit(name, scale)
-    return Unit.suiting(unit, first.value)
+        symbol = read(solution.unknown, text, quantity).unit
+        if symbol is not None and (unit := parse_unit(quantity, symbol)) is not None:
+            return unit
+    return suit_unit(si, first.value)
 
 
 def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: MotionSolution) -> str:

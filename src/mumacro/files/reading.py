@@ -109,7 +109,7 @@ def _tables_among(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
     return tables, [path for path in paths if path not in set(tables)]
 
 
-class Block(NamedTuple):
+class RowBlock(NamedTuple):
     """Some rows in order."""
 
     batch: pa.RecordBatch  #: of a row that could not be read, nulls
@@ -146,7 +146,7 @@ class ParquetSource:
         self.parts = list(pa.dataset.dataset(names, schema=self.schema, **options).get_fragments())
         self.where = f"{files[0]}: "
 
-    def blocks(self, file: int, names: Sequence[str]) -> Iterator[Block]:
+    def blocks(self, file: int, names: Sequence[str]) -> Iterator[RowBlock]:
         """Yield the rows of a file in blocks, of the columns ``names``."""
         part, row = self.parts[file], 0
         scan = pa.dataset.ParquetFragmentScanOptions(pre_buffer=False)
@@ -160,7 +160,7 @@ class ParquetSource:
             for batch in part.to_batches(self.schema, columns=names, **options):
                 numbers = range(row + 1, row + 1 + len(batch))
                 row += len(batch)
-                yield Block(batch, row / max(part.metadata.num_rows, 1), numbers)
+                yield RowBlock(batch, row / max(part.metadata.num_rows, 1), numbers)
         except (pa.ArrowException, OSError) as error:
             raise FilesError(f"{part.path}: damaged after row {row} ({error})") from None
 
@@ -211,7 +211,7 @@ class TextSource:
             where = "" if len(names) == len(self.tables) else f"{', '.join(names[:3])} "
             say(f"{where}read as: {form}")
 
-    def blocks(self, file: int, names: Sequence[str]) -> Iterator[Block]:
+    def blocks(self, file: int, names: Sequence[str]) -> Iterator[RowBlock]:
         """Yield the rows of a file in blocks, of the columns ``names``: inputs are numbers where
         all of a block are plain ones."""
         path, table = self.files[file], self.tables[file]
@@ -226,7 +226,7 @@ class TextSource:
                 table.see_signs(rows)
                 batch = pa.RecordBatch.from_arrays(_columns(rows, table, names), [*names])
                 share, heads = place / size, table.layout.heads
-                yield Block(batch, share, rows.lines, rows.faults, table.signs, rows, heads)
+                yield RowBlock(batch, share, rows.lines, rows.faults, table.signs, rows, heads)
         except TextError as error:
             raise FilesError(f"{path}: {error}") from None
 

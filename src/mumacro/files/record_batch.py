@@ -101,7 +101,7 @@ def answer(
     >>> rejects.to_pylist()
     [{'row': 0, 'field': 'v0', 'value': '-1.0', 'reason': 'must be finite and >= 0'}]
     """
-    kind = kind_in(batch, kind_of(contact, direction))
+    kind = kind_of_batch(batch, kind_of(contact, direction))
     units = units_of_fields(batch.schema)
     columns = find_columns(batch.schema.names, rigid, include, kind, units=units)
     result = answer_columns(batch, surrogate or Surrogate.open(), columns)
@@ -204,7 +204,7 @@ def _with_unit(name: str, unit: str | None) -> str:
     return f"{name} [{unit}]" if unit and split_unit(name)[1] is None else name
 
 
-def kind_in(batch: pa.RecordBatch, kind: Kind, where: str = "") -> Kind:
+def kind_of_batch(batch: pa.RecordBatch, kind: Kind, where: str = "") -> Kind:
     """Return the contact and the direction of a batch: those of its columns, else ``kind``.
 
     Raise FilesError, after ``where``, for a column with several values, with an unknown one, or
@@ -263,7 +263,7 @@ def answer_columns(
 
     Raise FilesError where it has another contact or direction than the batches before it.
     """
-    if columns.words and (kind := kind_in(batch, SPRING)) != columns.kind:
+    if columns.words and (kind := kind_of_batch(batch, SPRING)) != columns.kind:
         both = " and ".join(", ".join(one.names.values()) for one in (columns.kind, kind))
         raise FilesError(f"the file holds {both}: it is one for a file; write a file for each")
     by_heading: dict[str, Array] = {}

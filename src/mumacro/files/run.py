@@ -10,17 +10,17 @@ import numpy as np
 import pyarrow as pa
 
 from mumacro.files import reading
-from mumacro.files.reading import Block, ParquetSource, TextSource, lines_of
+from mumacro.files.reading import ParquetSource, RowBlock, TextSource, lines_of
 from mumacro.files.record_batch import (
     REJECTS,
     FilesError,
     answer_columns,
     answer_fields,
     find_columns,
-    kind_in,
+    kind_of_batch,
     names_of_columns,
 )
-from mumacro.files.writing import Output, csv_lines, written_as
+from mumacro.files.writing import OutputFormat, csv_lines, written_as
 from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import KIND
 from mumacro.inputs.fields import Kind, kind_of
@@ -150,14 +150,14 @@ class _Run:
         names, where = self.source.schema.names, self.source.where
         if words := [name for name in KIND if name in names]:
             first = next(self.source.blocks(0, words), None)
-            kind = kind if first is None else kind_in(first.batch, kind, where)
+            kind = kind if first is None else kind_of_batch(first.batch, kind, where)
         units = units_of_fields(self.source.schema)
         self.columns = find_columns(names, rigid, include, kind, where, units)
         headings = self.columns.headings
         sep, decimal = written_as(
             reading.ending_of(out), self.source.sep, self.source.decimal, dialect
         )
-        self.output = Output(
+        self.output = OutputFormat(
             output_format, is_compressed, sep, decimal, headings.get("k", (None,))[0]
         )
         inputs = [heading for heading, _ in headings.values()]
@@ -232,7 +232,7 @@ class _Run:
                     f"{path}: changed while it was read; give the command again"
                 ) from None
 
-    def _piece(self, state: _State, block: Block) -> tuple[_State, Any]:
+    def _piece(self, state: _State, block: RowBlock) -> tuple[_State, Any]:
         """Return a block as it stands in the output, and the state after it."""
         answers, rejects, inputs, notes = answer_columns(
             block.batch, self.surrogate, self.columns, block.signs

@@ -31,7 +31,7 @@ def written_as(ending: str, sep: str, decimal: str, dialect: Dialect) -> tuple[s
     return sep or ",", decimal
 
 
-class Output(NamedTuple):
+class OutputFormat(NamedTuple):
     """How rows are written: ``text`` or ``parquet``; text piece by piece, ``is_compressed`` as .gz.
 
     ``sep`` and ``decimal`` are those of a table as text; in the column ``stiffness`` infinity is

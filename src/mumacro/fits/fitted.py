@@ -226,7 +226,7 @@ class Fit(Result):
 
     def _curve(
         self, label: str, along: str, here: Bools, fine: Array, fixed: Mapping[str, Any]
-    ) -> plotting.Curve:
+    ) -> plotting.MeasuredCurve:
         """Return the curve of the fit over the values ``fine`` of one input, with the points that
         ``here`` selects; ``fixed`` holds the other inputs."""
         mu, deviation = self.predict(**{along: fine}, **fixed)
@@ -235,7 +235,7 @@ class Fit(Result):
             column[here] for column in (self.points[along], self.points["mu_macro"], self.residuals)
         )
         band = self._width() * deviation
-        return plotting.Curve(label, x, friction, bars, residuals, fine, mu, band)
+        return plotting.MeasuredCurve(label, x, friction, bars, residuals, fine, mu, band)
 
     def _title(self) -> str:
         return f"{', '.join(self._value_texts())}; {self.contact}, {self.direction}"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from mumacro import plotting
-from mumacro.inputs.fields import unit_of
+from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.notes import NOTE, Note, texts_of
 from mumacro.results import Result, Rows

@@ -14,7 +14,7 @@ from mumacro.inputs.doubts import UNITS, remarks
 from mumacro.inputs.fields import AMPLITUDE, LIKE, NAMES, kind_of
 from mumacro.inputs.layout import ColumnNames, Dialect
 from mumacro.inputs.names import unknown_name
-from mumacro.inputs.text_tables import Most, Table, read_table
+from mumacro.inputs.text_tables import Most, TableOfNumbers, read_numbers
 from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.notes import REMARK, Note
@@ -41,7 +41,7 @@ def read_points(
     source: Path | bytes,
     dialect: Dialect = Dialect(),  # noqa: B008
     most: Most = Most(),  # noqa: B008
-) -> Table:
+) -> TableOfNumbers:
     """Return measured points in a table as text, or in a workbook: a file or its bytes.
 
     TextError tells what is wrong, and in which lines.
@@ -49,7 +49,7 @@ def read_points(
     >>> read_points(b"v0 [mm/s],mu_macro\\n10,0.2\\n").columns
     {'v0': array([0.01]), 'mu_macro': array([0.2])}
     """
-    return read_table(source, _COLUMN_NAMES, dialect, most)
+    return read_numbers(source, _COLUMN_NAMES, dialect, most)
 
 
 def unknowns_beside(columns: Container[str]) -> list[str]:

@@ -56,7 +56,7 @@ def _dots(a: Array, b: Array) -> Array:
     return np.asarray(np.einsum("ij,ij->i", a, b))
 
 
-class Samples(NamedTuple):
+class ProfileSamples(NamedTuple):
     """The curve at places ``s`` (m,), ascending; the last may be infinite."""
 
     s: Array
@@ -105,7 +105,7 @@ class Profile:
         """The chi2 up to which a contact is allowed."""
         return self._limit_of(float(self.samples.chi2.min()))
 
-    def sample(self, s: Array, slopes: bool = True) -> Samples:
+    def sample(self, s: Array, slopes: bool = True) -> ProfileSamples:
         """Return the curve at places ``s`` (m,); slopes and tilt are zero unless asked for."""
         rows, steps = self._model(s, slopes)
         squares = _dots(rows, rows)
@@ -118,7 +118,7 @@ class Profile:
         off = self._measured - factor[:, None] * rows
         chi2 = np.nan_to_num(_dots(off, off), nan=np.inf)
         tilt = -2.0 * factor * _dots(off, steps)
-        return Samples(s, rows, steps, factor, chi2, tilt, rise)
+        return ProfileSamples(s, rows, steps, factor, chi2, tilt, rise)
 
     def lowest(self) -> Places:
         """Return the samples that are minima."""
@@ -136,7 +136,7 @@ class Profile:
         if not s.size:
             return
         places = np.searchsorted(self.samples.s, s)
-        self.samples = Samples(
+        self.samples = ProfileSamples(
             *(
                 np.insert(old, places, new, axis=0)
                 for old, new in zip(self.samples, self.sample(s), strict=True)
@@ -214,7 +214,11 @@ class Profile:
         return best[least < self.samples.chi2[here] * (1.0 - _SAME)]
 
     def _zeros(
-        self, chords: Places, quantity: Callable[[Samples], Array], tolerance: float, slopes: bool
+        self,
+        chords: Places,
+        quantity: Callable[[ProfileSamples], Array],
+        tolerance: float,
+        slopes: bool,
     ) -> Array:
         """Return places in the chords at which a quantity passes through zero."""
         from scipy.optimize import brentq
@@ -279,7 +283,7 @@ class Profile:
                 low[i], high[i] = places[i, max(j - 1, 0)], places[i, min(j + 1, _ZOOM - 1)]
         return best
 
-    def _values(self, goal: Goal, samples: Samples) -> Array:
+    def _values(self, goal: Goal, samples: ProfileSamples) -> Array:
         spare = self.limit - samples.chi2
         half_width = np.sqrt(np.maximum(spare, 0.0) / samples.rise)
         # places at the border of what is allowed miss it by a rounding error

@@ -8,7 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.units import QUANTITIES, Scale, bound_of_unit, is_level, parse_unit, scale_in
+from mumacro.inputs.units import (
+    QUANTITIES,
+    Scale,
+    Unit,
+    canonical,
+    explain_unit,
+    is_level,
+    parse_unit,
+)
 
 # of a unit that turns: without one of them 1/s is a frequency, with one of them it is none
 _ANGLES = ("rad", "deg", "°", "turn", "rev", "cycle", "rpm", "arc")
@@ -86,13 +94,13 @@ def without_carried_unit(name: str, value: Any, unit: Any, quantity: str) -> Pla
     Raise InputError for a unit that the input cannot have.
     """
     text = _text_of(unit)
-    scale = scale_in(quantity, text) or scale_in(quantity, str(unit))
-    if scale is None:
+    parsed = parse_unit(quantity, text) or parse_unit(quantity, str(unit))
+    if parsed is None:
         si = _converted(value, text, QUANTITIES[quantity].unit, quantity)
         if si is None:
             raise InputError(name, _shown(value, text), _bound(quantity, value, text))
-        scale, value = Scale(), si
-    return Plain(_numbers(value), scale, parse_unit(quantity, text))
+        parsed, value = Unit(canonical(text)), si
+    return Plain(_numbers(value), parsed.scale, parsed.symbol)
 
 
 def scale_of_carried(name: str, unit: Any, quantity: str) -> Scale:
@@ -101,13 +109,15 @@ def scale_of_carried(name: str, unit: Any, quantity: str) -> Scale:
     Raise InputError for a unit that the input cannot have.
     """
     text = _text_of(unit)
-    scale = scale_in(quantity, text) or scale_in(quantity, str(unit))
-    if scale is None and not isinstance(unit, str):
+    parsed = parse_unit(quantity, text) or parse_unit(quantity, str(unit))
+    if parsed is not None:
+        return parsed.scale
+    one = None
+    if not isinstance(unit, str):
         one = _converted(1.0 * unit, text, QUANTITIES[quantity].unit, quantity)
-        scale = None if one is None else Scale(float(_magnitude(one)))
-    if scale is None:
+    if one is None:
         raise InputError(name, _shown(None, text), _bound(quantity, None, text))
-    return scale
+    return Scale(float(_magnitude(one)))
 
 
 def labelled_in_si(name: str, column: Any, quantity: str, scale: Scale | None = None) -> Any:
@@ -118,10 +128,10 @@ def labelled_in_si(name: str, column: Any, quantity: str, scale: Scale | None = 
     """
     unit = carried_unit(column)
     if unit is not None:
-        own = scale_of_carried(name, unit, quantity)
-        if scale is not None and own != scale:
+        carried = scale_of_carried(name, unit, quantity)
+        if scale is not None and carried != scale:
             raise two_units(name, _text_of(unit))
-        scale = own
+        scale = carried
     if library(column) != "xarray":
         return column if scale is None else scale.si(column)
     data = column.data
@@ -220,7 +230,7 @@ def _bound(quantity: str, value: Any, unit: str) -> str:
         number = math.nan
     if math.isnan(number):
         return QUANTITIES[quantity].bound
-    return bound_of_unit(quantity, number, unit)
+    return explain_unit(quantity, number, unit)
 
 
 def _shown(value: Any, unit: str) -> str:

@@ -15,15 +15,14 @@ import numpy as np
 
 from mumacro.errors import InputError
 from mumacro.inputs.carried import carried_unit, uncertain, without_carried_unit, without_mask
-from mumacro.inputs.fields import GAP, QUANTITY_OF, STIFFNESS, is_rigid
+from mumacro.inputs.fields import GAP, STIFFNESS, is_rigid, quantity_of
 from mumacro.inputs.numbers import split_number, tidy
 from mumacro.inputs.units import (
     QUANTITIES,
     Scale,
-    bound_of_unit,
     canonical,
+    explain_unit,
     parse_unit,
-    scale_in,
 )
 
 #: types of one real number; a truth value is none
@@ -99,7 +98,7 @@ def read(name: str, value: Any, quantity: str = "") -> Value:
         return Value(as_double(name, value))
     if of_type is Value:  # read before
         return value  # type: ignore[no-any-return]
-    quantity = quantity or QUANTITY_OF.get(name.removeprefix("std_"), "ratio")
+    quantity = quantity or quantity_of(name)
     if of_type is str:
         return _of_text(name, quantity, value)
     if is_gap(value):
@@ -234,8 +233,8 @@ def _of_text(name: str, quantity: str, raw: str) -> Value:
         if isinstance(error, InputError):
             raise
         raise InputError(name, raw, _of_no_number(quantity, str(error))) from None
-    scale = _scale_or_refuse(name, quantity, raw, number, unit)
-    return Value(scale.si(number), text=raw, unit=parse_unit(quantity, unit) if unit else None)
+    scale, symbol = _parse_or_refuse(name, quantity, raw, number, unit)
+    return Value(scale.si(number), text=raw, unit=symbol)
 
 
 def _of_no_number(quantity: str, reason: str) -> str:
@@ -247,19 +246,23 @@ def _of_no_number(quantity: str, reason: str) -> str:
     return f"a number [{about.unit}], or with a unit such as {about.such_as}{word}"
 
 
-def _scale_or_refuse(name: str, quantity: str, raw: str, number: float, unit: str) -> Scale:
+def _parse_or_refuse(
+    name: str, quantity: str, raw: str, number: float, unit: str
+) -> tuple[Scale, str | None]:
+    """Return the scale and the symbol of a unit, no symbol where there is none; InputError for one
+    that the quantity cannot have."""
     if not unit:
-        return Scale()
-    scale = scale_in(quantity, unit)
-    if scale is not None:
-        return scale
+        return Scale(), None
+    parsed = parse_unit(quantity, unit)
+    if parsed is not None:
+        return parsed.scale, parsed.symbol or None
     if unit.startswith(("-", "to ")):
         try:
             high, behind = split_number(unit.removeprefix("-").removeprefix("to ").strip())
         except ValueError:
             pass
         else:
-            if not behind or scale_in(quantity, behind):
+            if not behind or parse_unit(quantity, behind):
                 ends = f"{number:.12g}..{high:.12g}{behind}"
                 bound = f"a number; write an interval as {ends}" if name == "k" else _ONE_NUMBER
                 raise InputError(name, raw, bound)
@@ -267,7 +270,7 @@ def _scale_or_refuse(name: str, quantity: str, raw: str, number: float, unit: st
         deviation = f"{int(last['std']) / 10 ** len(last['part'] or ''):.12g}"
         value_text = f"{last['number'].replace(',', '.')} ± {deviation}{last['unit']}"
         raise InputError(name, raw, f"a number; write its deviation as {value_text}")
-    raise InputError(name, raw, bound_of_unit(quantity, number, unit))
+    raise InputError(name, raw, explain_unit(quantity, number, unit))
 
 
 def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) -> Value:
@@ -289,13 +292,13 @@ def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) ->
         in_percent = f"({number:.12g} ± {deviation:.12g}) %"
         bound = f"clear: it may be {in_percent}; write that, or the deviation without %"
         raise InputError(name, raw, bound)
-    own_unit = parse_unit(quantity, unit if relative else unit or behind) or None
+    of_value = unit if relative else unit or behind
+    scale, symbol = _parse_or_refuse(name, quantity, raw, number, of_value)
+    value = scale.si(number)
     if relative:
-        value = _scale_or_refuse(name, quantity, raw, number, unit).si(number)
-        return Value(value, abs(value) * deviation / 100.0, text=raw, unit=own_unit)
-    scale = _scale_or_refuse(name, quantity, raw, number, unit or behind)
-    scale_behind = _scale_or_refuse(name, quantity, raw, deviation, behind or unit)
-    return Value(scale.si(number), scale_behind.si(deviation), text=raw, unit=own_unit)
+        return Value(value, abs(value) * deviation / 100.0, text=raw, unit=symbol)
+    scale, _ = _parse_or_refuse(name, quantity, raw, deviation, behind or unit)
+    return Value(value, scale.si(deviation), text=raw, unit=symbol)
 
 
 def _interval(name: str, quantity: str, raw: str, text: str) -> Value:
@@ -305,11 +308,10 @@ def _interval(name: str, quantity: str, raw: str, text: str) -> Value:
     left, _, right = text.partition("..")
     low, unit = split_number(left.strip())
     high, behind = split_number(right.strip(" ."))
-    ends = (
-        _scale_or_refuse(name, quantity, raw, low, unit or behind).si(low),
-        _scale_or_refuse(name, quantity, raw, high, behind or unit).si(high),
-    )
+    scale_of_low, _ = _parse_or_refuse(name, quantity, raw, low, unit or behind)
+    scale, symbol = _parse_or_refuse(name, quantity, raw, high, behind or unit)
+    ends = scale_of_low.si(low), scale.si(high)
     if not 0.0 < ends[0] <= ends[1] < math.inf:
         raise InputError(name, raw, _INTERVAL)
     middle = min(max(math.sqrt(ends[0]) * math.sqrt(ends[1]), ends[0]), ends[1])
-    return Value(middle, None, *ends, raw, parse_unit(quantity, behind or unit) or None)
+    return Value(middle, None, *ends, raw, symbol)

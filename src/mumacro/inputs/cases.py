@@ -23,7 +23,6 @@ from mumacro.inputs.columns import (
     is_column,
     read_column,
     refuse_gaps,
-    same_unit,
     to_si,
 )
 from mumacro.inputs.fields import (
@@ -46,7 +45,7 @@ from mumacro.inputs.fields import (
 )
 from mumacro.inputs.names import in_place_of, suggestion
 from mumacro.inputs.numbers import check_signs
-from mumacro.inputs.units import split_unit
+from mumacro.inputs.units import scale_of, split_unit
 from mumacro.kernel.arrays import Array, Places, common_shape, flat
 
 
@@ -321,7 +320,7 @@ def _columns_in(
             if twice:
                 raise InputError(name, twice[0][0], "given once")
             of_field = of_fields.get(head, "") if name not in KIND else ""
-            if unit and of_field and not same_unit(name, unit, of_field):
+            if unit and of_field and scale_of(name, unit) != scale_of(name, of_field):
                 raise two_units(name, of_field)
             columns[name] = cases[head]
             if unit or of_field:

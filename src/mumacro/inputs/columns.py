@@ -33,8 +33,8 @@ from mumacro.inputs.case import (
     other_number,
     read,
 )
-from mumacro.inputs.fields import GAP, QUANTITY_OF, is_rigid
-from mumacro.inputs.units import QUANTITIES, scale_in
+from mumacro.inputs.fields import GAP, is_rigid, quantity_of
+from mumacro.inputs.units import QUANTITIES, parse_unit, scale_of
 from mumacro.kernel.arrays import Array
 
 _FLOAT = np.dtype(np.float64)
@@ -115,15 +115,16 @@ def read_column(name: str, values: Any, quantity: str = "", unit: str = "") -> C
         return Column(values)
     if of_type is Column:
         return values  # type: ignore[no-any-return]
-    quantity = quantity or QUANTITY_OF.get(name.removeprefix("std_"), "ratio")
-    scale = scale_in(quantity, unit) if unit else None
-    if unit and scale is None:
+    quantity = quantity or quantity_of(name)
+    parsed = parse_unit(quantity, unit) if unit else None
+    if unit and parsed is None:
         raise InputError(name, f"a column in {unit}", QUANTITIES[quantity].bound)
-    own = carried_unit(values)
-    if own is not None:
-        if scale is not None and scale_of_carried(name, own, quantity) != scale:
-            raise two_units(name, str(own))
-        values, scale, unit = without_carried_unit(name, values, own, quantity)
+    scale = None if parsed is None else parsed.scale
+    carried = carried_unit(values)
+    if carried is not None:
+        if scale is not None and scale_of_carried(name, carried, quantity) != scale:
+            raise two_units(name, str(carried))
+        values, scale, unit = without_carried_unit(name, values, carried, quantity)
     si, faults = _doubles(name, values, quantity)
     in_si: Any = si if scale is None else scale.si(si)  # type: ignore[arg-type]  # of an array
     return Column(in_si, unit or None, faults)
@@ -159,16 +160,6 @@ def refuse_gaps(name: str, column: Column) -> None:
         raise InputError(name, fault.entry, bound, place)
 
 
-def same_unit(name: str, one: str, other: str) -> bool:
-    """Return whether two units of an input have one scale.
-
-    >>> same_unit("v0", "mm/s", "mm s^-1"), same_unit("v0", "mm/s", "m/s")
-    (True, False)
-    """
-    quantity = QUANTITY_OF.get(name.removeprefix("std_"), "ratio")
-    return scale_in(quantity, one) == scale_in(quantity, other)
-
-
 def in_unit(name: str, value: Any, unit: str) -> Any:
     """Return a column, or one value, whose header or field has a unit: in SI, or as it was
     understood.
@@ -178,8 +169,7 @@ def in_unit(name: str, value: Any, unit: str) -> Any:
     >>> in_unit("y0", [2.0, 3.0], "um").si.tolist(), in_unit("y0", 2.0, "um").si
     ([2e-06, 3e-06], 2e-06)
     """
-    quantity = QUANTITY_OF.get(name.removeprefix("std_"), "ratio")
-    scale = scale_in(quantity, unit)
+    quantity, scale = quantity_of(name), scale_of(name, unit)
     if scale is None:
         raise InputError(name, f"a column in {unit}", QUANTITIES[quantity].bound)
     if library(value) in ("xarray", "dask"):
@@ -189,7 +179,7 @@ def in_unit(name: str, value: Any, unit: str) -> Any:
     one = read(name, value, quantity)
     if one.unit is None:
         return one.scaled(scale, unit)
-    if scale_in(quantity, one.unit) != scale:
+    if scale_of(name, one.unit) != scale:
         raise two_units(name, one.unit)
     return one
 

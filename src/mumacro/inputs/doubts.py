@@ -8,13 +8,13 @@ peak speed y0 omega no contact has.  A rigid contact is answered with what it as
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE
+from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE, quantity_of
 from mumacro.inputs.numbers import plain
-from mumacro.inputs.units import Scale, scale_of
+from mumacro.inputs.units import Unit, parse_unit
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.notes import REMARK, Note
 
@@ -73,9 +73,9 @@ def remarks(
         name: np.broadcast_to(column, shape) for name, column in arrays.items()
     }
     typed = {
-        name: _Unit(unit, scale)
-        for name, unit in (units or {}).items()
-        if (scale := scale_of(name, unit)) is not None
+        name: unit
+        for name, text in (units or {}).items()
+        if (unit := parse_unit(quantity_of(name), text)) is not None
     }
     by_field: dict[str, Note] = {}
     has_reason: Bools = np.zeros(shape, np.bool_)
@@ -217,7 +217,7 @@ def _sentence(
     what: str,
     case: Mapping[str, float],
     frequency: bool,
-    units: Mapping[str, "_Unit"],
+    units: Mapping[str, Unit],
     names: Mapping[str, str],
 ) -> tuple[str, str]:
     """Return the input that is doubted, and why, of one case."""
@@ -253,38 +253,37 @@ def _sentence(
     if name in units:
         typed, question = units[name], "is it right"
     else:
-        typed = _Unit("" if field.unit == "-" else field.unit, Scale())
-        question = f"is it in {field.words}" if typed.name else "is it a number, not per cent"
+        typed = Unit("" if field.unit == "-" else field.unit)
+        question = f"is it in {field.words}" if typed.symbol else "is it a number, not per cent"
     least, most = field.usual
-    usual = f"{typed.number(least)} to {typed.text(most)}" if least else f"up to {typed.text(most)}"
+    usual = (
+        f"{_number(least, typed)} to {_quantity(most, typed)}"
+        if least
+        else f"up to {_quantity(most, typed)}"
+    )
     word = names.get(name, name)
-    return word, f"{word} = {typed.text(value)}, usual is {usual}: {question}?"
+    return word, f"{word} = {_quantity(value, typed)}, usual is {usual}: {question}?"
 
 
 _CONTACTS = "contacts have 0.01 to 100"
 
 
-def _is(name: str, word: str, value: float, units: Mapping[str, "_Unit"]) -> str:
+def _is(name: str, word: str, value: float, units: Mapping[str, Unit]) -> str:
     """Return the question whether the value of an input, which is called a ``word``, is right; of a
     number without a unit, whether it is in SI."""
     if name in units:
-        return f"is {word} = {units[name].text(value)} right?"
+        return f"is {word} = {_quantity(value, units[name])} right?"
     return f"is {word} = {plain(value, 6)} in {INPUTS[name].unit}?"
 
 
-class _Unit(NamedTuple):
-    """A unit that was typed."""
+def _number(value: float, unit: Unit) -> str:
+    """Return a value in SI as a number of a unit."""
+    return plain(unit.scale.of_si(value), 6)
 
-    name: str
-    scale: Scale
 
-    def number(self, value: float) -> str:
-        """Return a value in SI as a number of this unit."""
-        return plain(self.scale.of_si(value), 6)
-
-    def text(self, value: float) -> str:
-        """Return the same with the unit."""
-        return f"{self.number(value)} {self.name}".rstrip()
+def _quantity(value: float, unit: Unit) -> str:
+    """Return the same with the unit."""
+    return f"{_number(value, unit)} {unit.symbol}".rstrip()
 
 
 def _largest(case: Mapping[str, float], *names: str) -> str:

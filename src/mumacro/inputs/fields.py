@@ -147,22 +147,24 @@ def is_rigid(text: object) -> bool:
     return isinstance(text, str) and text.strip().lower() == RIGID
 
 
-def unit_of(name: str) -> str:
-    """Return the SI unit of an input, or of one in its place.
+def quantity_of(name: str) -> str:
+    """Return what a value measures, by the name of an input, of its deviation, of a part of an
+    oscillation, or of another argument; a ratio where the name is not in the list.
 
-    >>> unit_of("k_low"), unit_of("f")
-    ('N/m', 'Hz')
+    >>> [quantity_of(name) for name in ("v0", "std_k", "normal.amplitude", "y.phase")]
+    ['speed', 'stiffness', 'force', 'angle']
     """
-    return INPUTS[name].unit
+    part, _, member = name.removeprefix("std_").partition(".")
+    return QUANTITY_OF.get("phase" if member == "phase" else part, "ratio")
 
 
-def described(name: str, more: str = "") -> str:
+def described(name: str, addition: str = "") -> str:
     """Return what an input is, with its unit, as descriptions have it.
 
     >>> described("v0"), described("f", ", in place of omega")
     ('Sliding speed [m/s]', 'Frequency of the oscillation [Hz], in place of omega')
     """
-    return f"{INPUTS[name].meaning} [{unit_of(name)}]{more}"
+    return f"{INPUTS[name].meaning} [{INPUTS[name].unit}]{addition}"
 
 
 def in_help(name: str) -> str:

@@ -14,9 +14,9 @@ from typing import NamedTuple
 from mumacro.errors import TextError
 from mumacro.inputs.decoding import NAMES
 from mumacro.inputs.fields import is_rigid
-from mumacro.inputs.names import find_heads, heading, meant_by, unit_in_si
+from mumacro.inputs.names import find_heads, heading, meant_by
 from mumacro.inputs.numbers import Signs
-from mumacro.inputs.units import QUANTITIES, Scale, canonical, scale_of, split_unit
+from mumacro.inputs.units import QUANTITIES, Scale, canonical, scale_of, split_unit, unit_of
 
 BLANKS = " "  #: the separator where any number of blanks stands between the cells
 #: separators of the cells, by the name that an option has
@@ -139,7 +139,7 @@ class Layout(NamedTuple):
         words += [f"units in line{'s' * (len(self.units) > 1)} {places}"] if self.units else []
         words += [f"rows {self.first}..{self.last}"] if self.last else []
         units = (
-            f"{name} [{split_unit(self.heads[i])[1] or unit_in_si(name)}]"
+            f"{name} [{split_unit(self.heads[i])[1] or unit_of(name)}]"
             for i, name in self.inputs.items()
         )
         return f"{', '.join(words)}; {', '.join(units)}"
@@ -268,7 +268,7 @@ def _refuse_rows_between(before: _Head, head: _Head, lines: list[str], dialect: 
     """Refuse a table with rows below a head that did not fit them, before the one that fits."""
     for i in range(before.end, head.at):
         cells = [] if is_comment(lines[i]) else split(lines[i], before.sep)
-        if len(cells) > 1 and any(map(is_number, cells)):
+        if len(cells) > 1 and any(map(starts_as_number, cells)):
             raise TextError(
                 f"line {i + 1}: rows of a segment stand between the heads of lines "
                 f"{before.at + 1} and {head.at + 1}: "
@@ -367,10 +367,10 @@ def _likely_head(lines: Sequence[str], skip: int, seps: Sequence[str]) -> _Head:
                 continue
             alike = sum(meant_by(cell, loosely=False) is not None for cell in cells[:200])
             below = split(lines[i + 1][:10_000], sep) if i + 1 < len(lines) else []
-            numbers = sum(is_number(cell) for cell in below)
+            numbers = sum(starts_as_number(cell) for cell in below)
             is_above = len(below) == len(cells) and numbers > len(cells) // 2
             score = alike + 0.5 * is_above + 0.01 * (sep in lines[i])
-            if not any(map(is_number, cells)) and score > most:
+            if not any(map(starts_as_number, cells)) and score > most:
                 best, most = _Head(i, i + 1, sep, cells), score
     if best is not None:
         return best
@@ -380,7 +380,7 @@ def _likely_head(lines: Sequence[str], skip: int, seps: Sequence[str]) -> _Head:
     return _Head(at, at + 1, seps[0], split(lines[at][:10_000], seps[0])[:MOST_COLUMNS])
 
 
-def is_number(cell: str) -> bool:
+def starts_as_number(cell: str) -> bool:
     """Return whether a cell begins as numbers do."""
     return cell.lstrip("+-−., ")[:1].isdigit()
 
@@ -499,7 +499,7 @@ def may_be_row(text: str, sep: str, width: int) -> bool:
     """Return whether a line that begins like a comment has as many cells as the head, with a
     number."""
     cells = text.split() if sep == BLANKS else text.split(sep)
-    return len(cells) == width > 1 and any(map(is_number, cells[1:]))
+    return len(cells) == width > 1 and any(map(starts_as_number, cells[1:]))
 
 
 def is_unit(text: str) -> bool:
@@ -557,7 +557,7 @@ def units_in(
 
 def _is_value(text: str) -> bool:
     """Return whether a cell is a number, other than the unit 1."""
-    return text != "1" and is_number(text)
+    return text != "1" and starts_as_number(text)
 
 
 def is_row_of_units(
@@ -569,7 +569,7 @@ def is_row_of_units(
     places = [i for i, name in enumerate(names[: len(cells)]) if name in like and texts[i]]
     scales = {i: scale_of(like[names[i]], texts[i]) for i in places}
     units = [i for i in places if scales[i] is not None and texts[i] not in ("-", "1")]
-    numbers = [texts[i] for i in places if i not in units and is_number(texts[i])]
+    numbers = [texts[i] for i in places if i not in units and starts_as_number(texts[i])]
     if any(text != "1" for text in numbers):
         return False
     is_empty = any(texts[i].lower() in GAPS or is_rigid(texts[i]) for i in places)

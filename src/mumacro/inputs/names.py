@@ -6,7 +6,15 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from mumacro.inputs.fields import INPUTS, NAMES, QUANTITY_OF
-from mumacro.inputs.units import QUANTITIES, Scale, bound_of_unit, canonical, scale_of, split_unit
+from mumacro.inputs.units import (
+    QUANTITIES,
+    Scale,
+    canonical,
+    explain_unit,
+    scale_of,
+    split_unit,
+    unit_of,
+)
 
 # Lower case, without spaces and punctuation.  Only names that hardly mean anything else, since a
 # file whose column has one of them while the input itself is missing is refused.
@@ -184,7 +192,7 @@ def _no_unit(name: str, unit: str, like: Mapping[str, str]) -> str:
     quantity = QUANTITY_OF[like[name]]
     if name == "omega" and scale_of("f", unit):
         return f"{name} cannot have: a frequency is f [Hz]; give {QUANTITIES[quantity].such_as}"
-    bound = bound_of_unit(quantity, 1.0, unit)
+    bound = explain_unit(quantity, 1.0, unit)
     if bound == QUANTITIES[quantity].bound:
         return f"{name} cannot have; give {QUANTITIES[quantity].such_as}"
     return f"{name} cannot have: it must be {bound} in place of 1 {unit}"
@@ -230,18 +238,9 @@ def _listed(heads: Sequence[str]) -> str:
 
 def _heading(name: str) -> str:
     """Return the heading that a column of an input has, in SI units."""
-    heading = f"{name} [{unit_in_si(name)}]"
+    heading = f"{name} [{unit_of(name)}]"
     more = {"omega": " or f [Hz]", "mu_macro": " (the mean friction force over Fz)"}
     return heading + more.get(name, "")
-
-
-def unit_in_si(name: str) -> str:
-    """Return the SI unit of a column.
-
-    >>> unit_in_si("k_low"), unit_in_si("mu_macro")
-    ('N/m', '-')
-    """
-    return INPUTS[name].unit if name in INPUTS else "-"
 
 
 def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
@@ -249,7 +248,7 @@ def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
     for loosely, candidates in ((False, heads), (True, heads[:_COMPARED])):
         for head in candidates:
             if field := _stands_for(head, name, loosely):
-                column = f"{field} [{_unit_of(head, field) or unit_in_si(field)}]"
+                column = f"{field} [{_unit_in_head(head, field) or unit_of(field)}]"
                 return head, column + (_HALVED if _is_whole(head, field) else "")
     return None
 
@@ -285,12 +284,12 @@ def _is_whole(head: str, field: str) -> bool:
     return field in ("y0", "Fz_amplitude") and _PEAK_TO_PEAK.search(head[:80]) is not None
 
 
-def _unit_of(head: str, field: str) -> str | None:
+def _unit_in_head(head: str, field: str) -> str | None:
     """Return the unit that a head has in brackets, or as its last words.
 
-    >>> _unit_of("Amplitude [um]", "y0"), _unit_of("Amplitude µm", "y0"), _unit_of("speed", "v0")
-    ('um', 'µm', None)
-    >>> _unit_of("v0_um_s", "v0"), _unit_of("k_N_per_mm", "k")
+    >>> [_unit_in_head(head, "y0") for head in ("Amplitude [um]", "Amplitude µm", "amplitude")]
+    ['um', 'µm', None]
+    >>> _unit_in_head("v0_um_s", "v0"), _unit_in_head("k_N_per_mm", "k")
     ('um/s', 'N/mm')
     """
     unit = split_unit(head)[1]

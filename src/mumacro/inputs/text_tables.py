@@ -3,7 +3,7 @@
 Every line of a table is accounted for: it is before the head, the head, units, data, a comment or
 empty (:mod:`mumacro.inputs.layout` finds how it is written).  What cannot be is refused by its
 line: another header, another segment, a row of statistics.  :class:`TextTable` gives the rows in
-pieces, whatever the length of the file; :func:`read_table` reads a table into memory.
+pieces, whatever the length of the file; :func:`read_numbers` reads a table into memory.
 """
 
 import csv
@@ -33,17 +33,17 @@ from mumacro.inputs.layout import (
     find_layout,
     is_comment,
     is_known,
-    is_number,
     is_unit,
     legend,
     may_be_row,
     split,
+    starts_as_number,
     uncommented,
     units_in,
 )
-from mumacro.inputs.names import absent, find_heads, heading, unit_in_si
+from mumacro.inputs.names import absent, find_heads, heading
 from mumacro.inputs.numbers import TOO_LARGE, Cell, Signs, read_number, split_number, tidy
-from mumacro.inputs.units import Scale, scale_of, split_unit
+from mumacro.inputs.units import Scale, scale_of, split_unit, unit_of
 from mumacro.inputs.workbooks import BEGIN, SEP, read_sheet
 from mumacro.kernel.arrays import Array, Places
 
@@ -258,15 +258,18 @@ class Account:
             remedy = self.layout.without(line)
             raise TextError(f"line {line}: {first!r} begins a row of statistics: {remedy}")
         inputs = [cells[i] for i in self.layout.inputs if i < len(cells)]
-        may_be_units = not any(is_number(cell) and cell.strip(" []()") != "1" for cell in inputs)
+        may_be_units = not any(
+            starts_as_number(cell) and cell.strip(" []()") != "1" for cell in inputs
+        )
         if may_be_units and self._has_units(line, text):
             return False
         width = len(self.layout.heads)
         is_whole = len(cells) in (width, width - self.layout.without_comments)
         filled = [cell for cell in map(str.strip, cells[:1000]) if cell]
-        is_title = len(filled) == 1 and width > 1 and not is_number(first)
+        is_title = len(filled) == 1 and width > 1 and not starts_as_number(first)
         if is_title or (
-            not is_whole and not any(is_number(cell) or cell.lower() in GAPS for cell in filled)
+            not is_whole
+            and not any(starts_as_number(cell) or cell.lower() in GAPS for cell in filled)
         ):
             shown = " ".join(text.split())[:60]
             remedy = self.layout.without(line)
@@ -648,7 +651,7 @@ def _sheet_in(
     return data, dialect._replace(sep=SEP, encoding="utf-8"), said
 
 
-class Table(NamedTuple):
+class TableOfNumbers(NamedTuple):
     """Columns of numbers that were read."""
 
     columns: dict[str, Array]  #: by name, in SI, (n,)
@@ -659,18 +662,19 @@ class Table(NamedTuple):
     read_as: str  #: what was found out, see :meth:`Layout.described`
 
 
-def read_table(
+def read_numbers(
     source: Path | bytes,
     column_names: ColumnNames,
     dialect: Dialect,
     most: Most = Most(),  # noqa: B008
-) -> Table:
+) -> TableOfNumbers:
     """Return the columns of a table that mean something, in SI, from a file or its bytes.
 
     TextError tells all that is wrong: its ``faults`` are one for each line.
 
     >>> data = "Rig 7\\n\\nv0\\tmu_macro\\nmm/s\\t%\\n1,5\\t7\\n2,5\\t9\\n".encode()
-    >>> table = read_table(data, ColumnNames({"v0": "v0", "mu_macro": "mu0"}, [["v0"]]), Dialect())
+    >>> names = ColumnNames({"v0": "v0", "mu_macro": "mu0"}, [["v0"]])
+    >>> table = read_numbers(data, names, Dialect())
     >>> table.columns["mu_macro"].tolist(), table.skipped
     ([0.07, 0.09], [1])
     >>> table.read_as
@@ -715,10 +719,10 @@ def read_table(
     if wrong:
         raise TextError.of([fault for _, fault in sorted(wrong, key=lambda one: one[0])])
     units = {
-        name: split_unit(layout.heads[i])[1] or unit_in_si(name) for name, (i, _) in columns.items()
+        name: split_unit(layout.heads[i])[1] or unit_of(name) for name, (i, _) in columns.items()
     }
     skipped = sorted({*layout.skipped, *table.account.skipped})
-    return Table(si, own, units, lines, skipped, table.read_as)
+    return TableOfNumbers(si, own, units, lines, skipped, table.read_as)
 
 
 def again(lines: list[int]) -> str:
@@ -739,7 +743,7 @@ def read_columns(
     like: Mapping[str, str],
     dialect: Dialect = Dialect(),  # noqa: B008
     most: Most = Most(),  # noqa: B008
-) -> Table:
+) -> TableOfNumbers:
     """Return named columns of numbers of a table, all of which it must have.
 
     ``like`` has their names, each with the input whose units it has.
@@ -748,4 +752,4 @@ def read_columns(
     >>> read_columns(data, {"x": "y0", "Ft": "Fz"}).columns["x"].tolist()
     [1.5e-06, 2.5e-06]
     """
-    return read_table(source, ColumnNames(like, [(name,) for name in like]), dialect, most)
+    return read_numbers(source, ColumnNames(like, [(name,) for name in like]), dialect, most)

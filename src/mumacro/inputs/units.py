@@ -7,13 +7,13 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from mumacro.inputs.fields import QUANTITY_OF, RAD_PER_CYCLE, SI
+from mumacro.inputs.fields import QUANTITY_OF, RAD_PER_CYCLE, SI, quantity_of
 from mumacro.inputs.numbers import tidy
 
 
 class Scale(NamedTuple):
-    """A unit in SI: value * times / over.  Small powers of ten stand in ``over``: 2 um are 2 / 1e6,
-    rounded once."""
+    """The size of a unit in SI: value * times / over.  Small powers of ten stand in ``over``: 2 um
+    are 2 / 1e6, rounded once."""
 
     times: float = 1.0
     over: float = 1.0
@@ -25,6 +25,13 @@ class Scale(NamedTuple):
     def of_si(self, value: float) -> float:
         """Return ``value``, which is in SI, in this unit."""
         return value * self.over / self.times
+
+
+class Unit(NamedTuple):
+    """A unit by its symbol, as the table writes it, and its size."""
+
+    symbol: str
+    scale: Scale = Scale()
 
 
 class Quantity(NamedTuple):
@@ -200,18 +207,17 @@ _SHOWN: dict[str, dict[str, Scale]] = {
 }
 
 
-def suited(unit: str, value: float) -> tuple[str, Scale]:
-    """Return the unit in which a value in an SI ``unit`` is a number that people like to read, and
-    its scale: the largest of the usual ones in which it is at least 0.1; the SI unit for 0.
+def suit_unit(si: str, value: float) -> Unit:
+    """Return the unit in which a value in the unit ``si`` is a number that people read easily: the
+    largest of the usual ones in which it is at least 0.1; the SI unit for 0.
 
-    >>> suited("m", 2.455e-6)[0], suited("N/m", 13.07e6)[0], suited("-", 0.3)[0]
-    ('um', 'N/um', '-')
+    >>> suit_unit("m", 2.455e-6).symbol, suit_unit("N/m", 13.07e6).symbol
+    ('um', 'N/um')
     """
-    usual, size = _SHOWN.get(unit, {}), abs(value)
+    usual, size = [Unit(*one) for one in _SHOWN.get(si, {}).items()], abs(value)
     if not usual or size == 0.0 or not math.isfinite(size):
-        return unit, Scale()
-    of_units = [*usual.items()]
-    return next((one for one in of_units if size >= 0.1 * one[1].si(1.0)), of_units[-1])
+        return Unit(si)
+    return next((unit for unit in usual if size >= 0.1 * unit.scale.si(1.0)), usual[-1])
 
 
 # --- a unit as people and programs write it -------------------------------------------------------
@@ -382,43 +388,49 @@ def split_unit(column: str) -> tuple[str, str | None]:
     return name.strip(), unit.strip()
 
 
+# an amplitude as vibrations are measured: from zero to the peak
+_PEAK = re.compile(r"(.*?\w) ?(?:0-?|zero[ -]to[ -])?(?:peak|pk|(?<=0)-?p)", re.IGNORECASE)
+
+
+def parse_unit(quantity: str, text: str) -> Unit | None:
+    """Return a unit of a quantity; None for one that is not in the table.  That of a length may say
+    that the value is an amplitude.
+
+    >>> parse_unit("speed", "mm sec^-1"), parse_unit("length", "um 0-pk").symbol
+    (Unit(symbol='mm/s', scale=Scale(times=1.0, over=1000.0)), 'um')
+    >>> parse_unit("length", "umpp") is None
+    True
+    """
+    units = QUANTITIES[quantity].units
+    if text in units:
+        return Unit(text, units[text])
+    if len(text) > LONGEST:
+        return None
+    symbol = canonical(text)
+    if quantity == "length" and (match := _PEAK.fullmatch(text.strip(" []()"))) is not None:
+        of_length = canonical(match[1])
+        symbol = of_length if of_length in units else symbol
+    return Unit(symbol, units[symbol]) if symbol in units else None
+
+
 def scale_of(name: str, unit: str) -> Scale | None:
-    """Return the scale of a ``unit`` of a value by its name; None for a unit that is not in the
+    """Return the size of a ``unit`` of a value by its name; None for a unit that is not in the
     table.
 
     >>> scale_of("k", "N/mm").si(3.0)
     3000.0
     """
-    return scale_in(QUANTITY_OF[name], unit)
+    parsed = parse_unit(quantity_of(name), unit)
+    return None if parsed is None else parsed.scale
 
 
-def scale_in(quantity: str, unit: str) -> Scale | None:
-    """Return the scale of a ``unit`` of a quantity; None for a unit that is not in the table."""
-    units = QUANTITIES[quantity].units
-    scale = units.get(unit)
-    if scale is not None or len(unit) > LONGEST:
-        return scale
-    return units.get(parse_unit(quantity, unit))
+def unit_of(name: str) -> str:
+    """Return the SI unit of a value by its name; of a phase degrees.
 
-
-# an amplitude as vibrations are measured: from zero to the peak
-_PEAK = re.compile(r"(.*?\w) ?(?:0-?|zero[ -]to[ -])?(?:peak|pk|(?<=0)-?p)", re.IGNORECASE)
-
-
-def parse_unit(quantity: str, unit: str) -> str:
-    """Return a unit of a quantity as the table writes it; that of a length may say that the value
-    is an amplitude.
-
-    >>> parse_unit("length", "um 0-pk"), parse_unit("length", "umpp")
-    ('um', 'umpp')
-    >>> parse_unit("speed", "mm sec^-1")
-    'mm/s'
+    >>> [unit_of(name) for name in ("k_low", "mu_macro", "x.amplitude", "y.phase")]
+    ['N/m', '-', 'm', 'deg']
     """
-    if quantity == "length" and (match := _PEAK.fullmatch(unit.strip(" []()"))) is not None:
-        of_length = canonical(match[1])
-        if of_length in QUANTITIES[quantity].units:
-            return of_length
-    return canonical(unit)
+    return QUANTITIES[quantity_of(name)].unit
 
 
 # --- what is meant by a unit that a quantity cannot have ------------------------------------------
@@ -445,13 +457,13 @@ def is_level(unit: str) -> bool:
     return any(word.rstrip("s") in _LEVELS or word.startswith("db") for word in words)
 
 
-def bound_of_unit(quantity: str, number: float, unit: str) -> str:
+def explain_unit(quantity: str, number: float, unit: str) -> str:
     """Return what a value must be whose ``unit`` its quantity cannot have: as in "y0 must be ...",
     with the number to give where it is clear what is meant.
 
-    >>> bound_of_unit("length", 4.0, "umpp"), bound_of_unit("force", 100.0, "g")
+    >>> explain_unit("length", 4.0, "umpp"), explain_unit("force", 100.0, "g")
     ('half of peak to peak: give 2um', 'a force: the weight of 100 g is 0.980665 N, give 0.980665N')
-    >>> bound_of_unit("angular frequency", 20.0, "kHz")
+    >>> explain_unit("angular frequency", 20.0, "kHz")
     'in radians per second: did you mean f=20kHz?'
     """
     about, text = QUANTITIES[quantity], unit.strip()[:LONGEST]

@@ -192,7 +192,7 @@ class Motion(Result):
         """
         i = self._place(index)
         case = {name: float(column[i]) for name, column in self.scenes.columns.items()}
-        title = plotting.in_words(case, {"contact": self.scenes.contact})
+        title = plotting.case_title(case, {"contact": self.scenes.contact})
         title = f"{title}\n{'; '.join(self._oscillations(i))}".rstrip()
         return plotting.plot_cycle(*self.cycle(index), case["mu0"], title, ax)
 

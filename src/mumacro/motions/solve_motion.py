@@ -16,13 +16,14 @@ from mumacro.errors import InputError
 from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import real
 from mumacro.inputs.columns import to_si
-from mumacro.inputs.fields import RAD_PER_CYCLE, Numbers, unit_of
+from mumacro.inputs.fields import RAD_PER_CYCLE, Numbers, quantity_of
 from mumacro.inputs.names import unknown_name
+from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.motions.motion import PARTS, motion
 from mumacro.motions.oscillation import read_oscillation
 from mumacro.questions.search import Found, Search
-from mumacro.questions.solutions import Reach, Solution, quantity_of_unknown, unit_of_unknown
+from mumacro.questions.solutions import Reach, Solution
 
 #: inputs of a motion that may be unknown
 INPUTS = ("v0", "k", "Fz", "f", "omega", "mu0")
@@ -76,9 +77,9 @@ class MotionSolution(Solution):
         places = [root.value for roots in self.roots for root in roots]
         even = np.geomspace if _log(x[0], x[-1]) else np.linspace
         x = np.unique(np.clip([*x, *even(x[0], x[-1], _DRAWN), *places], x[0], x[-1]))
-        mean, _ = Curve(self.unknown, self.of, self.case).evaluate(x)
+        mean, _ = MotionCurve(self.unknown, self.of, self.case).evaluate(x)
         case = {name: value for name, value in self.case.items() if name in INPUTS}
-        title = plotting.in_words(case, {"contact": self.case.get("contact", "spring")})
+        title = plotting.case_title(case, {"contact": self.case.get("contact", "spring")})
         axis, log = _axis(self.unknown), _log(x[0], x[-1])
         return plotting.plot_roots(
             axis,
@@ -163,7 +164,7 @@ def solve_motion(
     targets = np.atleast_1d(real("target", target)).astype(np.float64)
     if targets.ndim != 1 or not np.isfinite(targets).all():
         raise InputError("target", target, "finite numbers, one or a list")
-    curve = Curve(unknown, of, case)
+    curve = MotionCurve(unknown, of, case)
     low, high = _range(within, unknown, curve)
     solution = _solved(curve, low, high, targets)
     if unknown != "v0" or any(solution.roots) or not {"x", "normal"} <= case.keys():
@@ -172,7 +173,7 @@ def solve_motion(
     return replace(solution, other_way=opposite if any(opposite.roots) else None)
 
 
-def _solved(curve: "Curve", low: float, high: float, targets: Array) -> MotionSolution:
+def _solved(curve: "MotionCurve", low: float, high: float, targets: Array) -> MotionSolution:
     """Return all roots in a range, without a look at the other way."""
     search = Search(curve, _places(curve, low, high), low, high, targets)
     samples = search.samples
@@ -195,7 +196,7 @@ def _solved(curve: "Curve", low: float, high: float, targets: Array) -> MotionSo
     )
 
 
-def _places(curve: "Curve", low: float, high: float) -> Array:
+def _places(curve: "MotionCurve", low: float, high: float) -> Array:
     """Return where a range is sampled first."""
     if curve.unknown == "v0" and low == 0.0:
         # a speed of 0 leaves a choice of the cycle: the search begins right beside it
@@ -213,7 +214,7 @@ def _without_whole_turn(roots: list[Found]) -> list[Found]:
 # --- the curve ------------------------------------------------------------------------------------
 
 
-class Curve:
+class MotionCurve:
     """A mean force over the unknown of one motion."""
 
     costly = True
@@ -241,11 +242,11 @@ class Curve:
             if case.get(name) is not None:
                 self.case[name] = self.number(name)
 
-    def opposite(self) -> "Curve":
+    def opposite(self) -> "MotionCurve":
         """Return the same motion with x turned by half a period: it moves the other way."""
         terms = read_oscillation("x", self.case["x"])
         opposite = [(order, amplitude, phase + 180.0) for order, amplitude, phase in terms]
-        return Curve(self.unknown, self.of, {**self.case, "x": opposite})
+        return MotionCurve(self.unknown, self.of, {**self.case, "x": opposite})
 
     def evaluate(self, values: Array) -> tuple[Array, Array]:
         """Return the mean force and the estimate of its error, each in the shape of the values; NaN
@@ -292,12 +293,12 @@ class Curve:
         return total
 
 
-def _range(within: Any, unknown: str, curve: Curve) -> tuple[float, float]:
+def _range(within: Any, unknown: str, curve: MotionCurve) -> tuple[float, float]:
     """Return the range to search, ascending."""
     if within is None:
         return _usual_range(unknown, curve)
     part, _, member = unknown.partition(".")
-    quantity = quantity_of_unknown(unknown)
+    quantity = quantity_of(unknown)
     name = part if member else unknown
     try:
         low, high = (read_one(name, end, quantity) for end in within)
@@ -312,7 +313,7 @@ def _range(within: Any, unknown: str, curve: Curve) -> tuple[float, float]:
     return low, high
 
 
-def _usual_range(unknown: str, curve: Curve) -> tuple[float, float]:
+def _usual_range(unknown: str, curve: MotionCurve) -> tuple[float, float]:
     """Return where the unknown matters."""
     member = unknown.partition(".")[2]
     if member == "phase":
@@ -356,4 +357,4 @@ def _log(low: float, high: float) -> bool:
 
 
 def _axis(unknown: str) -> str:
-    return f"{unknown} [{unit_of_unknown(unknown)}]"
+    return f"{unknown} [{unit_of(unknown)}]"

@@ -11,7 +11,7 @@ from mumacro.inputs.fields import POSITIVE
 from mumacro.notes import REMARK, Note
 from mumacro.outputs.entry import Member, Output, Values
 from mumacro.outputs.evaluated import Evaluated, where
-from mumacro.outputs.gradient import slopes
+from mumacro.outputs.gradient import slopes_by_input
 
 #: how far, in whole deviations, mu_macro one deviation up or down may be from the straight line
 STRAIGHT = 0.2
@@ -27,7 +27,7 @@ def std(cases: Evaluated) -> Values:
     }
     terms, doubts = (
         [where(exact[name], 0.0, of_inputs[name] * spread) for name, spread in spreads.items()]
-        for of_inputs in slopes(cases)
+        for of_inputs in slopes_by_input(cases)
     )
     with np.errstate(all="ignore"):
         total, doubt = (reduce(np.hypot, parts) for parts in (terms, doubts))

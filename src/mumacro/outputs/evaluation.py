@@ -100,7 +100,7 @@ def _cost_of(kind: Kind) -> float:
     return factor * math.prod(_COSTS.get(word, 1.0) for word in words)
 
 
-def answer(
+def evaluate_cases(
     tabulated: Tabulated, cases: Cases, outputs: tuple[Output, ...] = (), groups: bool = False
 ) -> Answer[Any]:
     """Return the answer to cases with these outputs; ``groups`` keeps v~, y~ and l0, too."""

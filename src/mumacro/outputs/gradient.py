@@ -11,7 +11,7 @@ from mumacro.outputs.evaluated import Evaluated, where
 PER = {name: PER_UNIT["Fz" if name == AMPLITUDE else name] for name in ALL_FIELDS}
 
 
-def slopes(cases: Evaluated) -> tuple[dict[str, Any], dict[str, Any]]:
+def slopes_by_input(cases: Evaluated) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return d mu_macro / d input and the bounds by field; NaN along k where contact is rigid."""
     no_slope = where(cases.rigid, math.nan, 0.0)
     slopes, bounds = cases.gradient, cases.gradient_bound
@@ -20,7 +20,7 @@ def slopes(cases: Evaluated) -> tuple[dict[str, Any], dict[str, Any]]:
 
 def gradient(cases: Evaluated) -> Values:
     """Return d mu_macro / d input, with bounds."""
-    of_inputs, bounds = slopes(cases)
+    of_inputs, bounds = slopes_by_input(cases)
     return {f"gradient.{name}": slope for name, slope in of_inputs.items()} | {
         f"gradient_bound.{name}": bound for name, bound in bounds.items()
     }

@@ -25,8 +25,8 @@ from mumacro.inputs.fields import (
     Kind,
     field_of,
     kind_of,
-    unit_of,
 )
+from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.notes import Note
 from mumacro.outputs.evaluation import chosen
@@ -138,7 +138,7 @@ class Law(Result):
             band_of="k" if self.std is None else "std",
             borders=[(crossing.value, crossing.name) for crossing in self.border],
             roots_of=roots_of,
-            title=plotting.in_words(
+            title=plotting.case_title(
                 self.case if self.k_ends is None else {**self.case, "k": self.k_ends},
                 self.kind.names,
             ),

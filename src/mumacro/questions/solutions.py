@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.fields import QUANTITY_OF, unit_of
+from mumacro.inputs.units import unit_of
 from mumacro.results import Result, Rows
 
 NO_LIMIT = 1e300  # of the unknown: what is beyond it is all that a double holds
@@ -95,7 +95,7 @@ class Solution(Result):
     @property
     def unit(self) -> str:
         """The unit of the unknown: SI, of a phase degrees."""
-        return unit_of_unknown(self.unknown)
+        return unit_of(self.unknown)
 
     def reason(self, index: int = 0) -> str:
         """Return why a target has no root, or over which range every value is one; empty where it
@@ -191,28 +191,6 @@ class Solution(Result):
     def _below(self) -> list[str]:
         reasons = dict.fromkeys(filter(None, map(self.reason, range(len(self.targets)))))
         return [*reasons][:4]
-
-
-def unit_of_unknown(unknown: str) -> str:
-    """Return the unit of an unknown: SI, of a phase degrees.
-
-    >>> [unit_of_unknown(name) for name in ("v0", "x.amplitude", "normal.amplitude", "y.phase")]
-    ['m/s', 'm', 'N', 'deg']
-    """
-    part, _, member = unknown.partition(".")
-    if member == "phase":
-        return "deg"
-    return ("N" if part == "normal" else "m") if member else unit_of(part)
-
-
-def quantity_of_unknown(unknown: str) -> str:
-    """Return what an unknown measures.
-
-    >>> [quantity_of_unknown(name) for name in ("v0", "normal.amplitude", "y.phase")]
-    ['speed', 'force', 'angle']
-    """
-    part, _, member = unknown.partition(".")
-    return "angle" if member == "phase" else QUANTITY_OF[part]
 
 
 def _counted(number: int, noun: str) -> str:

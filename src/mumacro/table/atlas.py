@@ -143,7 +143,7 @@ def _cosine(share: Array, rest: Array, name: str) -> Array:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class TabulatedQuantity:
     """One tabulated quantity: name, variable in a block of a table file, meaning.
 
     ``while_sliding``: not zero in continuous sliding.  ``smooth_at_border``: without a root or a
@@ -213,7 +213,7 @@ class Chart:
             v = border_of(y) * np.sin(0.5 * math.pi * b) ** 2
         return v, y, y - 1.0
 
-    def holds(self, quantity: Quantity) -> bool:
+    def holds(self, quantity: TabulatedQuantity) -> bool:
         """Return whether the block tabulates a quantity; elsewhere it is zero."""
         return self.regime != CONTINUOUS or quantity.while_sliding
 
@@ -222,9 +222,9 @@ def _axis(axis: Any) -> Axis:
     return Axis(_text(axis.name), axis.low, axis.high)
 
 
-def _quantity(q: Any) -> Quantity:
+def _quantity(q: Any) -> TabulatedQuantity:
     texts = _text(q.name), _text(q.variable), _text(q.meaning)
-    return Quantity(*texts, bool(q.while_sliding), bool(q.smooth_at_border))
+    return TabulatedQuantity(*texts, bool(q.while_sliding), bool(q.smooth_at_border))
 
 
 def _listed(entry: Callable[[int], Any]) -> Iterator[Any]:

@@ -124,7 +124,7 @@ class Table:
     @property
     def quantities(self) -> list[str]:
         """The names of the tabulated quantities, mu_ratio first."""
-        return names_in(self.attributes)
+        return quantity_names(self.attributes)
 
     @property
     def interpolation_errors(self) -> dict[str, dict[str, float]]:
@@ -138,11 +138,11 @@ class Table:
             for method in INTERPOLATIONS
         }
 
-    def quantities_of(self, chart: atlas.Chart) -> list[atlas.Quantity]:
+    def quantities_of(self, chart: atlas.Chart) -> list[atlas.TabulatedQuantity]:
         """Return the quantities that the block of ``chart`` tabulates."""
         return [BY_NAME[name] for name in self.quantities if chart.holds(BY_NAME[name])]
 
 
-def names_in(attributes: dict[str, Any]) -> list[str]:
+def quantity_names(attributes: dict[str, Any]) -> list[str]:
     """Return the names of the tabulated quantities in the attributes of a table."""
     return str(attributes.get("quantities")).split()

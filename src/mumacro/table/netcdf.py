@@ -27,7 +27,7 @@ from mumacro.table.blocks import (
     BorderPiece,
     Table,
     TabulatedContact,
-    names_in,
+    quantity_names,
 )
 from mumacro.table.polynomials import nodes
 
@@ -335,7 +335,7 @@ def _attributes(root: hdf5.Group) -> dict[str, Any]:
         json.loads(attributes.get("builder_options", "{}"))
     except (ValueError, TypeError, RecursionError) as error:
         raise root.refuse(f"attribute 'builder_options' is no JSON ({error})") from None
-    names = names_in(attributes)
+    names = quantity_names(attributes)
     if names[:1] != ["mu_ratio"] or len({*names}) != len(names) or not {*names} <= BY_NAME.keys():
         raise root.refuse(
             f"attribute 'quantities' is {names}, this program knows {', '.join(BY_NAME)}"
@@ -394,7 +394,7 @@ def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: Sequence[str
 
 def _read(root: hdf5.Group) -> Table:
     attributes = _attributes(root)
-    names = names_in(attributes)
+    names = quantity_names(attributes)
     below = root.group("border")
     border = [_border_piece(below.group(name), axis) for name, axis, _ in atlas.BORDER_PIECES]
     contacts = {name: _contact(below.group(name), name, names) for name in atlas.CHARTS}

@@ -11,8 +11,8 @@ import pytest
 
 import mumacro
 from mumacro.cli.main import main
-from mumacro.inputs.fields import INPUTS, QUANTITY_OF, unit_of
-from mumacro.inputs.units import QUANTITIES, scale_of
+from mumacro.inputs.fields import INPUTS, QUANTITY_OF
+from mumacro.inputs.units import QUANTITIES, scale_of, unit_of
 from tests.support.comparing import close
 
 CASE = {"mu0": "0.3", "Fz": "10N", "k": "1N/um", "y0": "2um", "f": "20kHz", "v0": "10mm/s"}

@@ -16,7 +16,7 @@ from mumacro.inputs.case import read
 from mumacro.inputs.doubts import remarks
 from mumacro.inputs.fields import INPUTS
 from mumacro.inputs.numbers import read_number
-from mumacro.inputs.units import QUANTITIES, canonical, scale_in
+from mumacro.inputs.units import QUANTITIES, Unit, canonical, parse_unit
 from mumacro.motions.oscillation import read_oscillation
 from tests.support.comparing import close
 
@@ -201,7 +201,7 @@ def test_a_number_that_python_writes_is_read_to_the_last_bit(number: float) -> N
 def test_every_unit_of_the_table_is_read_and_is_its_own_name() -> None:
     for name, quantity in QUANTITIES.items():
         for unit, scale in quantity.units.items():
-            assert scale_in(name, unit) == scale
+            assert parse_unit(name, unit) == Unit(unit, scale)
             if unit not in ("", "1", "-"):
                 assert quantity.units.get(canonical(unit)) == scale
         assert quantity.units[quantity.unit].si(1.0) == 1.0

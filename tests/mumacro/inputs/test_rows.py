@@ -11,7 +11,7 @@ from mumacro.inputs.case import read
 from mumacro.inputs.doubts import remarks
 from mumacro.inputs.layout import ColumnNames, Dialect
 from mumacro.inputs.numbers import TOO_LARGE, Signs
-from mumacro.inputs.text_tables import Table, read_cell, read_table
+from mumacro.inputs.text_tables import TableOfNumbers, read_cell, read_numbers
 from mumacro.inputs.units import scale_of
 from tests.support.comparing import close
 
@@ -19,8 +19,8 @@ POINTS = ColumnNames({"v0": "v0", "mu_macro": "mu0"}, [["v0"], ["mu_macro"]])
 ONE, TWO, THREE = "1,0.069\n", "2,0.097\n", "5,0.174\n"
 
 
-def table_of(text: str) -> Table:
-    return read_table(text.encode(), POINTS, Dialect())
+def table_of(text: str) -> TableOfNumbers:
+    return read_numbers(text.encode(), POINTS, Dialect())
 
 
 @pytest.mark.parametrize("between", range(4))

@@ -26,7 +26,7 @@ from mumacro.inputs.decoding import Text, encoding_of
 from mumacro.inputs.layout import BLANKS, GAPS, ColumnNames, Dialect
 from mumacro.inputs.names import absent
 from mumacro.inputs.numbers import Signs, evidence
-from mumacro.inputs.text_tables import Table, read_cell, read_table
+from mumacro.inputs.text_tables import TableOfNumbers, read_cell, read_numbers
 from mumacro.inputs.units import Scale
 from tests.support.comparing import close
 
@@ -72,9 +72,9 @@ def refused(text: str | bytes, **options: Any) -> TextError:
     return refusal.value
 
 
-def read(text: str | bytes, **options: Any) -> Table:
+def read(text: str | bytes, **options: Any) -> TableOfNumbers:
     data = text if isinstance(text, bytes) else text.encode()
-    return read_table(
+    return read_numbers(
         data,
         ColumnNames(dict(list(POINTS.like.items())[:2]), POINTS.required_groups),
         Dialect(**options),

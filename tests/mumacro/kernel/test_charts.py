@@ -61,7 +61,7 @@ def test_every_point_has_one_block_and_its_coordinates_are_in_range(table: Surro
 
 @pytest.mark.parametrize("quantity", atlas.QUANTITIES, ids=atlas.QUANTITY_NAMES)
 def test_the_form_of_a_value_is_the_value_at_the_nodes(
-    table: Surrogate, quantity: atlas.Quantity
+    table: Surrogate, quantity: atlas.TabulatedQuantity
 ) -> None:
     """value = base + factor q with q from the file: exact at nodes, to the table's error."""
     for index, (chart, part) in enumerate(

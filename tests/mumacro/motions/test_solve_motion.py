@@ -10,7 +10,7 @@ import pytest
 import mumacro
 from mumacro import InputError, solve_motion
 from mumacro.cli.main import main
-from mumacro.motions.solve_motion import UNKNOWNS, Curve
+from mumacro.motions.solve_motion import UNKNOWNS, MotionCurve
 from tests.support.comparing import close
 
 CONVEYOR: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e5, "f": 50.0, "x": 1e-4}
@@ -36,7 +36,7 @@ def test_no_root_of_a_scan_is_missed_and_every_root_is_one(seed: int) -> None:
     unknown, case = random_problem(seed)
     x = mumacro.solve_motion(unknown, 1e9, **case).samples[0]
     fine = np.interp(np.linspace(0.0, 1.0, 300), np.linspace(0.0, 1.0, x.size), x)
-    mean, _ = Curve(unknown, "mu_macro", case).evaluate(fine)
+    mean, _ = MotionCurve(unknown, "mu_macro", case).evaluate(fine)
     targets = np.nanquantile(mean, [0.2, 0.5, 0.8])
     solution = mumacro.solve_motion(unknown, targets, **case)
     for target, roots in zip(targets, solution.roots, strict=True):
@@ -186,7 +186,7 @@ def test_the_width_of_a_flat_root_holds_all_places_where_the_mean_crosses_the_ta
     }
     target = 0.28897534219814974
     k = np.geomspace(300.0, 500.0, 50)
-    mean, _ = Curve("k", "mu_macro", case).evaluate(k)
+    mean, _ = MotionCurve("k", "mu_macro", case).evaluate(k)
     crossings = k[:-1][np.diff(np.sign(mean - target)) != 0.0]
     assert crossings.size
     roots = mumacro.solve_motion("k", target, **case).roots[0]

@@ -252,7 +252,7 @@ def test_the_picture_shows_band_and_borders(surrogate: Surrogate, pair: Any) -> 
     pytest.importorskip("matplotlib").use("Agg")
     law, _, _ = law_of(surrogate, pair, INTERVAL, refine=True)
     axes = law.plot()
-    k_title = plotting.in_words({"k": law.k_ends})
+    k_title = plotting.case_title({"k": law.k_ends})
     assert (" to " in k_title, k_title in axes.get_title(loc="left")) == (True, True)
     (band,) = axes.collections
     corners = band.get_paths()[0].vertices
