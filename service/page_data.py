@@ -33,7 +33,7 @@ _HALF = "half of p-p"
 # label, offered units, decimal exponents of the usual range [SI], text at the start, a note
 _INPUTS = {
     "mu0": ("friction", ["-"], [-2, 0.5], "0.3", ""),
-    "Fz": ("force", ["N", "mN", "kN"], [-3, 5], "10 N", ""),
+    "Fz": ("load", ["N", "mN", "kN"], [-3, 5], "10 N", ""),
     "k": ("stiffness", ["N/µm", "kN/m", "N/m"], [2, 10], "1 N/µm", ""),
     "y0": ("amplitude", ["µm", "nm", "mm", "m"], [-10, -3], "2 µm", _HALF),
     AMPLITUDE: ("amplitude", ["N", "mN", "kN"], [-3, 5], "5 N", _HALF),
@@ -47,7 +47,7 @@ _CHOICES = {
     "direction": {
         "across": "shaken across the sliding direction",
         "along": "shaken along the sliding direction",
-        "normal": "under an oscillating force",
+        "normal": "under an oscillating load",
     },
 }
 # published points of steel on steel, docs/how-to/fit.md: the case as an address, the columns
@@ -74,7 +74,7 @@ def _impossible(contact: str, direction: str) -> str:
     try:
         kind_of(contact, direction)
     except InputError:
-        return "A ball under an oscillating force is not modelled: its contact radius would change."
+        return "A ball under an oscillating load is not modelled: its contact radius would change."
     return ""
 
 

@@ -34,8 +34,9 @@ V_RANGE, Y_RANGE, NORMAL_RANGE = (1e-4, 1e3), (1e-2, 1e3), (0.0, 0.999)
 #: contours of mu~ on every map, and those with a number
 LEVELS = (0.01, 0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 LABELLED = (0.01, 0.03, 0.1, 0.3, 0.5, 0.7, 0.9, 0.95, 0.99)
-#: of every map, evenly from mu~ = 0 to 1; darker is slipperier, also without colour
-COLOURS = ("#3f87b5", "#7fb9d3", "#c4e0e6", "#f2f2e2", "#fdf3d4")
+#: of every map, evenly over its areas between two contours; darker is slipperier, also without
+#: colour
+COLOURS = ("#35609f", "#3a86b6", "#58aec0", "#90cfbb", "#cbe8b9", "#fff9d6")
 INK, BLUE, RED, GREY = "#16202c", "#0b5cad", "#a3242b", "#6b7683"
 #: of all borders, readable on light and on dark paper
 BORDER = "#c8323c"
@@ -450,10 +451,11 @@ def speeds(n: int) -> Array:
 def band_colours() -> list[str]:
     """Return the colour of each area between two contours, from below the lowest of ``LEVELS`` to
     above the highest, #rrggbb."""
-    middles = 0.5 * (np.array([0.0, *LEVELS]) + np.array([*LEVELS, 1.0]))
+    # evenly over the areas, not over mu~: below 0.1 and above 0.9 they would be nearly one colour
+    areas = np.linspace(0.0, 1.0, len(LEVELS) + 1)
     table = np.array([[int(one[i : i + 2], 16) for i in (1, 3, 5)] for one in COLOURS])
     even = np.linspace(0.0, 1.0, len(COLOURS))
-    channels = np.stack([np.interp(middles, even, column) for column in table.T], axis=1)
+    channels = np.stack([np.interp(areas, even, column) for column in table.T], axis=1)
     return ["#" + "".join(f"{round(x):02x}" for x in one) for one in channels.tolist()]
 
 

@@ -329,3 +329,42 @@ def contrast(one: str, other: str) -> float:
 def test_colours_that_no_style_chooses_are_seen_on_light_and_dark_paper(paper: str) -> None:
     for colour in [plotting.BORDER, *(look.colour for look in plotting.REGIMES.values())]:
         assert contrast(colour, paper) >= 3.0  # WCAG 2.2, 1.4.11: graphical objects
+
+
+#: how colours are seen [linear light]: Machado, Oliveira and Fernandes, IEEE TVCG 15 (2009) 1291
+SEEN = {
+    "by most": np.eye(3),
+    "without red": np.array(
+        [
+            [0.152286, 1.052583, -0.204868],
+            [0.114503, 0.786281, 0.099216],
+            [-0.003882, -0.048116, 1.051998],
+        ]
+    ),
+    "without green": np.array(
+        [
+            [0.367322, 0.860646, -0.227968],
+            [0.280085, 0.672501, 0.047413],
+            [-0.011820, 0.042940, 0.968881],
+        ]
+    ),
+    "without blue": np.array(
+        [
+            [1.255528, -0.076749, -0.178779],
+            [-0.078411, 0.930809, 0.147602],
+            [0.004733, 0.691367, 0.303900],
+        ]
+    ),
+}
+
+
+@pytest.mark.parametrize("seen", SEEN)
+def test_neighbours_on_the_map_are_told_apart_by_everyone(seen: str) -> None:
+    colours = plotting.band_colours()
+    assert len(colours) == len(plotting.LEVELS) + 1
+    assert (colours[0], colours[-1]) == (plotting.COLOURS[0], plotting.COLOURS[-1])
+    coded = np.array([[int(one[i : i + 2], 16) / 255 for i in (1, 3, 5)] for one in colours])
+    linear = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
+    light = np.clip(linear @ SEEN[seen].T, 0.0, 1.0) @ np.array([0.2126, 0.7152, 0.0722])
+    lightness = 116.0 * np.cbrt(light) - 16.0  # L* of CIE 1976
+    assert np.diff(lightness).min() > 2.5

@@ -296,7 +296,7 @@ def test_it_fits_every_width(open_page: Any, width: int, address: str) -> None:
 #: the texts that are not seen whole: their own box, or one around it that hides or scrolls, is
 #: smaller than they are
 CUT = """
-const unseen = '.unseen, legend, option, script, style, svg, .choice input';
+const unseen = '.unseen, option, script, style, svg, .choice input';
 const cut = (box, text) => text.bottom > box.bottom + 1 || text.right > box.right + 1 ||
   text.top < box.top - 1 || text.left < box.left - 1;
 const found = [];
@@ -390,6 +390,48 @@ def test_no_text_of_a_plot_lies_on_another(open_page: Any, width: int) -> None:
         for law in ("", "&along=Fz", "&along=k&scale=linear", "&along=y0&v0=1e3"):
             page = open_page(f"#{kind}{law}&panel=motion", width=width, height=800)
             assert page.run(COVERED) == [], (kind, law)
+
+
+@pytest.mark.parametrize("address", ["", LONGEST, "#panel=motion", "#contact=ball&k=0.1..10 N/um"])
+def test_every_box_holds_its_text_on_paper(open_page: Any, address: str) -> None:
+    page = open_page(address, width=1280, height=800)
+    with page.paper():
+        assert page.run(CUT) == []
+        assert page.run(COVERED) == []
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_every_level_and_regime_of_the_map_is_named(open_page: Any, width: int) -> None:
+    page = open_page(width=width, height=800)
+    levels = [f"{level:g}" for level in (0.0, *plotting.LEVELS, 1.0)]
+    assert page.texts("#map .legend text") == ["µ/µ₀", *levels]
+    names = page.run(
+        "return [...document.querySelectorAll('#map .area:not(.covered)')].map((one) =>"
+        " one.textContent.replaceAll(' ', ''));"
+    )
+    assert names == ["stickandslip", "continuoussliding"]
+
+
+def test_links_have_one_look_and_buttons_another(open_page: Any) -> None:
+    page = open_page("#panel=fit")
+    looks = page.run(
+        "const look = (one) => { const seen = getComputedStyle(one); return [seen.color,"
+        " seen.backgroundColor, seen.textDecorationLine].join(' '); };"
+        "const of = (all) => [...new Set([...document.querySelectorAll(all)].map(look))];"
+        "return [of('a'), of('button:enabled:not([role=tab], #tab-motion), .button')];"
+    )
+    assert [len(one) for one in looks] == [1, 1]
+    assert "underline" in looks[0][0]
+    assert "underline" not in looks[1][0]
+
+
+def test_the_choices_have_their_names_before_them(open_page: Any) -> None:
+    for width in (320, 1280):
+        page = open_page(width=width, height=800)
+        for name, title in (("contact", "Contact"), ("direction", "Oscillation")):
+            label, words = page.find(f"#{name}-title"), page.find(f"#{name}")
+            assert label.text == title
+            assert label.rect["x"] + label.rect["width"] <= words.rect["x"]
 
 
 def test_a_clamp_is_found(open_page: Any) -> None:

@@ -47,10 +47,10 @@ def test_what_was_understood_stands_below_the_field(open_page: Any) -> None:
     page = open_page()
     page.type("#field-k", "1 ± 10 % N/um")
     page.type("#field-k", "1 N/um ± 10 %")
-    assert page.text("#note-k") == "1\xa0N/µm, standard deviation 0.1\xa0N/µm"
+    assert page.text("#note-k") == "1 N/µm, standard deviation 0.1 N/µm"
     page.type("#field-k", "1000 N/mm")
     page.type("#field-y0", "2e-6 m")
-    assert page.text("#note-y0") == "read as 2\u00a0µm"
+    assert page.text("#note-y0") == "read as 2 µm"
     page.type("#field-f", "0.0002")  # in the field of 20 kHz
     assert page.text("#note-f") == "read as 0.2 Hz"
     page.type("#field-y0", "2um")  # µ is typed as u
@@ -571,7 +571,7 @@ def test_a_motion_is_in_the_address_and_the_history(open_page: Any) -> None:
     assert page.run("return window.steps;") == 3
     assert "y=3+um+%40+30+deg" in page.address()
     assert "panel=motion" in page.address()
-    assert "3 µm at 30°" in page.text("#motion-note-y")
+    assert page.text("#motion-note-y") == ""  # it would say no more than the text
     back(page, -2)
     assert page.value("#motion-y") == "2 um"
     assert page.value("#motion-unknown") == "v0"

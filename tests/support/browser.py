@@ -163,7 +163,9 @@ class Page:
         return self.browser.find_element("css selector", selector)
 
     def text(self, selector: str) -> Any:
-        return self.run(f"return document.querySelector({selector!r}).textContent;")
+        """The text of an element, without what keeps its equations on one line."""
+        text = self.run(f"return document.querySelector({selector!r}).textContent;")
+        return text.replace("\N{NO-BREAK SPACE}", " ").replace("\N{WORD JOINER}", "")
 
     def texts(self, selector: str) -> Any:
         return self.run(
@@ -318,6 +320,16 @@ class Page:
         metrics |= {"deviceScaleFactor": ratio}
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         self.settle()
+
+    @contextmanager
+    def paper(self) -> Any:
+        """The page as it is printed, on the screen."""
+        self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+        try:
+            self.settle()
+            yield
+        finally:
+            self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
 
     def scheme(self, name: str) -> None:
         """Switch to the light or dark scheme, and wait until the page has taken it and every colour

@@ -3,7 +3,7 @@
 import { $, write } from "./dom.js";
 import { html, render } from "../lib/lit-html.js";
 import { PARTS, caseOf, motionOf, toAddress } from "./state.js";
-import { prose } from "./words.js";
+import { capital, prose } from "./words.js";
 
 /** What is copied, with the word on its button. */
 const BUTTONS = { link: "Link", curl: "curl", python: "Python", command: "Command" };
@@ -66,12 +66,12 @@ export function motionTexts(state, answer) {
  * function takes them; where there is no number, it takes the reason, and the link alone is left.
  */
 export function copies(id) {
-  const button = ([name, word]) => html`<button class="word" data-copy=${name}>${word}</button>`;
+  const button = ([name, word]) => html`<button data-copy=${name}>${word}</button>`;
   render(Object.entries(BUTTONS).map(button), $(`${id}-row`));
   const [buttons, field] = [[...$(`${id}-row`).children], $(`${id}-text`)];
   let texts = {};
   let reason = null;
-  const shown = (name) => texts[name] ?? `Not available: ${prose(reason)}`;
+  const shown = (name) => texts[name] ?? `Not available. ${capital(prose(reason))}`;
   $(`${id}-row`).addEventListener("click", async ({ target }) => {
     const name = target.closest("[data-copy]")?.dataset.copy;
     if (!name) return;

@@ -7,11 +7,11 @@ import { inputsOf } from "./state.js";
 import {
   about,
   around,
+  asTyped,
   inUnit,
   numberOf,
   pageOf,
   prose,
-  typeset,
   unitAt,
   withUnit,
 } from "./words.js";
@@ -38,14 +38,11 @@ export function choice(store, name, words, reasons = {}) {
       <span>${words[value]}</span>
     </label>
   `;
-  return html`<fieldset class="choice" id=${name}>
-    <legend>${about.titles[name]}</legend>
-    ${Object.keys(words).map(one)}
-  </fieldset>`;
+  return html`<div class="field" role="radiogroup" aria-labelledby=${`${name}-title`}>
+    <span id=${`${name}-title`} class="label">${about.titles[name]}</span>
+    <div class="choice" id=${name}>${Object.keys(words).map(one)}</div>
+  </div>`;
 }
-
-/** A text without what makes no difference: blanks, u in place of µ. */
-const asTyped = (text) => text.replaceAll(" ", "").replaceAll("µ", "u");
 
 /**
  * What the service understood of the text that is typed, where that says more than the text; in a
@@ -80,7 +77,7 @@ export function inputsPanel(store, moved) {
           data-dial=${movable ? name : nothing}
           title=${`${meaning}${movable ? `. ${HOW}` : ""}`}
         >
-          ${typeset(symbol)}
+          <span class="symbol">${symbol}</span>
           <span class="label"
             >${label}<small>${name === typing ? "Enter takes it" : note}</small></span
           >
@@ -106,7 +103,6 @@ export function inputsPanel(store, moved) {
     const tool = (panel, words) => html`
       <button
         id=${`tab-${panel}`}
-        class="word"
         type="button"
         aria-controls="tool"
         aria-expanded=${String(store.state.panel === panel)}
@@ -118,7 +114,6 @@ export function inputsPanel(store, moved) {
     const interval = html`
       <button
         id="as-interval"
-        class="word"
         type="button"
         title="Ten per cent less to ten per cent more, to be changed"
         ?disabled=${!(k > 0)}
@@ -128,8 +123,8 @@ export function inputsPanel(store, moved) {
       </button>
     `;
     return html`<p class="ways">
-      from ${tool("stiffness", "materials")} · ${tool("fit", "points")} ·
-      <a href=${pageOf("how-to/loop")}>loop</a> · ${interval}
+      from ${tool("stiffness", "materials")} ${tool("fit", "points")} ${interval}
+      <a href=${pageOf("how-to/loop")}>loop</a>
     </p>`;
   }
 

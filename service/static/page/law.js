@@ -16,6 +16,7 @@ import {
   toSI,
   toUnit,
   unitOver,
+  whole,
 } from "./words.js";
 
 const { area, bisectCenter } = d3;
@@ -76,6 +77,7 @@ export function lawPanel(store, moved) {
     (question) => post("v1/law", question),
     (reply, { scale }) => {
       law = { ...reply, scale };
+      for (const id of ["csv", "law-image"]) $(id).disabled = false;
       plot.redraw();
       describe();
     },
@@ -135,7 +137,7 @@ export function lawPanel(store, moved) {
     for (const { value } of law.border) {
       const x = plot.x(toUnit(law.along, value, unit()));
       inside.append("path").attr("class", "border").attr("d", `M${x} ${box.y}v${box.height}`);
-      const left = x > box.x + box.width - 100;
+      const left = x - box.x > box.width / 2;
       // at the end of the line that is farther from the curve
       const at = bisectCenter(law.values, value);
       const above = plot.y(law.mu_macro[at]) > box.y + box.height / 2;
@@ -207,18 +209,13 @@ export function lawPanel(store, moved) {
     if (!place || !plot.box || !plot.holds(place)) {
       const one = numberOf(answer?.inputs[law.along]);
       const words =
-        one === undefined
-          ? ""
-          : `Your case: ${text(one)}: µ\u00a0=\u00a0${friction(answer.mu_macro, 4)}`;
-      write("law-read", words);
+        one === undefined ? "" : `Your case: ${text(one)}, µ = ${friction(answer.mu_macro, 4)}`;
+      write("law-read", whole(words));
       return;
     }
     const i = bisectCenter(law.values, toSI(law.along, plot.x.invert(place[0]), unit()));
-    write(
-      "law-read",
-      `At the pointer: ${text(law.values[i])}: µ\u00a0=\u00a0${friction(law.mu_macro[i], 4)}, ` +
-        inWords(law.regime[i]),
-    );
+    const there = `${text(law.values[i])}, µ = ${friction(law.mu_macro[i], 4)}`;
+    write("law-read", whole(`At the pointer: ${there}, ${inWords(law.regime[i])}`));
   }
 
   plot.follow({
@@ -277,7 +274,11 @@ export function lawPanel(store, moved) {
     [answer, colours, target] = [reply, scale, wanted];
     behind = old;
     tell();
-    if (!answer) return;
+    for (const id of ["csv", "law-image"]) $(id).disabled = !law;
+    if (!answer) {
+      write("law-read", "There is no case to draw yet.");
+      return;
+    }
     const { value: mu0 } = answer.inputs.mu0;
     const below = [unit(), mu0, answer.std, colours?.contact, colours?.direction].join();
     if (below !== ground) plot.redraw();

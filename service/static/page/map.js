@@ -5,9 +5,12 @@ import { $, attribute, write } from "./dom.js";
 import { caseOf, inputsOf } from "./state.js";
 import { Plot } from "./plot.js";
 import { get } from "./service.js";
-import { about, inPrint, inWords, show, toUnit, unitAt } from "./words.js";
+import { about, inPrint, inWords, show, toUnit, unitAt, whole } from "./words.js";
 
 const { contours } = d3;
+
+const DIGITS = 27; // pixels of a number of the legend
+const SIDES = 114; // pixels beside the map, with the numbers of its axes
 
 /** The relative deviation of a product of powers of inputs; 0 where none has one. */
 function deviationOf(inputs, names) {
@@ -63,7 +66,7 @@ export function mapPanel(store, moved, loaded) {
       },
       top: 40,
       right: 62,
-      below: 30,
+      below: 19 + 11 * numberLines(),
     });
     const { box, inside, over } = plot;
     const ground = inside.append("rect").attr("class", "shade").style("fill", map.colours[0]);
@@ -75,14 +78,12 @@ export function mapPanel(store, moved, loaded) {
         .style("fill", map.colours[i + 1])
         .attr("d", outline(shade));
     });
-    plot.path(
-      map.border.filter(([v, y]) => v > 0 && y > 0),
-      "border",
-    );
+    plot.rimmed(plot.shape(map.border.filter(([v, y]) => v > 0 && y > 0)), "border");
     const at = (u, w) => [box.x + u * box.width, box.y + (1 - w) * box.height];
+    // a number gives way to the name of a regime
+    for (const [u, w, words] of map.areas) plot.area(words, ...at(u, w));
     for (const [level, u, w] of map.labels)
       plot.text(show(level), ...at(u, w), "tag").attr("dy", "0.35em");
-    for (const [u, w, words] of map.areas) plot.text(words, ...at(u, w), "area");
     legend(over);
   }
 
@@ -91,7 +92,7 @@ export function mapPanel(store, moved, loaded) {
     if (target) {
       const values = map.mu_ratio.map((one) => one * map.unit);
       const shape = contours().size([map.v_tilde.n, map.y_tilde.n]).contour(values, target);
-      plot.inside.append("path").attr("class", "target").attr("d", outline(shape));
+      plot.rimmed(outline(shape), "target");
     }
     if (!answer?.groups || store.state.contact === "rigid") return;
     if (answer.state.direction === map.direction) ownAxes(answer);
@@ -118,27 +119,27 @@ export function mapPanel(store, moved, loaded) {
     plot.outerAxes({ x: axis("v0", map.v_tilde), y: axis(up, map.y_tilde) });
   }
 
-  /** The colours and the levels between them, below the map; levels without room have no number. */
+  /** Lines for the numbers of the legend. */
+  const numberLines = () => (plot.width - SIDES < DIGITS * map.colours.length ? 2 : 1);
+
+  /** The colours and the levels between them, below the map; where they are narrow, every second
+   * number is a line lower. */
   function legend(over) {
     const { box } = plot;
     const wide = box.width / map.colours.length;
-    const top = plot.height - 24;
+    const lines = numberLines();
+    const top = plot.height - 13 - 11 * lines;
     const group = over.append("g").attr("class", "legend");
     const text = (words, x, y, anchor = "middle") =>
       group.append("text").attr("x", x).attr("y", y).attr("text-anchor", anchor).text(words);
     text("µ/µ₀", box.x - 8, top + 9, "end");
-    let end = -Infinity;
     map.colours.forEach((colour, i) => {
       const left = box.x + i * wide;
       const cell = group.append("rect").attr("x", left).attr("y", top).style("fill", colour);
       cell.attr("width", wide + 0.5).attr("height", 9);
-      const words = i ? show(map.levels[i - 1]) : "0";
-      const half = 3 * words.length + 2;
-      if (left - half < end) return;
-      text(words, left, top + 20);
-      end = left + half;
+      text(i ? show(map.levels[i - 1]) : "0", left, top + 20 + 11 * (i % lines));
     });
-    if (box.x + box.width - 5 > end) text("1", box.x + box.width, top + 20);
+    text("1", box.x + box.width, top + 20);
   }
 
   /** The user's point, with a bar for its deviation or for the interval of k. */
@@ -176,11 +177,12 @@ export function mapPanel(store, moved, loaded) {
     if (!at) {
       const { v_tilde: v, y_tilde: y } = answer?.groups ?? {};
       const words = answer?.groups
-        ? `Your case: ṽ = ${show(v ?? Infinity)}, ỹ = ${show(y ?? Infinity)}: ` +
+        ? `Your case: ṽ = ${show(v ?? Infinity)}, ỹ = ${show(y ?? Infinity)}, ` +
           `µ/µ₀ = ${show(answer.mu_ratio)}`
         : "";
-      const line = target ? `; dash-dotted\u00a0line:\u00a0${show(target)}` : "";
-      write("map-read", `${outside() || words}${line}`);
+      const line = target ? `Dash-dotted line: µ/µ₀ = ${show(target)}.` : "";
+      const said = outside() || words;
+      write("map-read", whole(line ? `${said.replace(/[^.]$/, "$&.")} ${line}` : said));
       return;
     }
     const [v, y] = [plot.x.invert(at[0]), plot.y.invert(at[1])];
@@ -188,10 +190,8 @@ export function mapPanel(store, moved, loaded) {
     const column = cell(at[0], plot.box.x, plot.box.width, map.v_tilde.n);
     const row = cell(plot.box.y + plot.box.height - at[1], 0, plot.box.height, map.y_tilde.n);
     const ratio = map.mu_ratio[row * map.v_tilde.n + column] * map.unit;
-    write(
-      "map-read",
-      `At the pointer: ṽ = ${show(v, 3)}, ỹ = ${show(y, 3)}: µ/µ₀ ≈ ${show(ratio, 3)}`,
-    );
+    const there = `ṽ = ${show(v, 3)}, ỹ = ${show(y, 3)}, µ/µ₀ ≈ ${show(ratio, 3)}`;
+    write("map-read", whole(`At the pointer: ${there}`));
   }
 
   /** The values of the case at a place of the map. */

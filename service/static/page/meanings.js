@@ -19,9 +19,9 @@ export const definitions = (rows) =>
       </div>`,
   );
 
-/** Shows a list, and keeps it for the dialog. */
-export function list(id, rows) {
-  lists.set(id, rows);
+/** Shows a list, and keeps it for the dialog, with what is said there below it. */
+export function list(id, rows, below = "") {
+  lists.set(id, { rows, below });
   render(definitions(rows), $(id));
 }
 
@@ -30,12 +30,12 @@ export function meaningsDialog() {
   const dialog = $("meanings");
   for (const button of document.querySelectorAll("[data-meanings]"))
     button.addEventListener("click", () => {
-      const rows = lists.get(button.dataset.meanings) ?? [];
+      const { rows, below } = lists.get(button.dataset.meanings);
       const line = ([name, meaning, value, why, all = why]) =>
         value === null
           ? html`<p><b>${name}</b>: ${meaning}. None: ${all}.</p>`
           : html`<p><b>${name} ${value}</b>: ${meaning}.</p>`;
-      render(rows.map(line), $("meanings-list"));
+      render([...rows.map(line), html`<p>${below}</p>`], $("meanings-list"));
       dialog.showModal();
     });
   dialog.addEventListener("click", ({ target }) => {

@@ -9,7 +9,17 @@ import { list } from "./meanings.js";
 import { Plot } from "./plot.js";
 import { post } from "./service.js";
 import { PARTS, motionOf, partsOf, uncertainOf } from "./state.js";
-import { about, digitsWithin, friction, inUnit, prefixed, prose, show, typeset } from "./words.js";
+import {
+  about,
+  asTyped,
+  called,
+  digitsWithin,
+  friction,
+  inUnit,
+  prefixed,
+  prose,
+  show,
+} from "./words.js";
 
 const { extent } = d3;
 
@@ -33,7 +43,16 @@ const SLIPS = {
   ball: "way that the contact of the ball slips in a period, in the mean",
   rigid: "way that the contact slips in a period",
 };
+/** An oscillation without what makes no difference. */
+const plainly = (text) =>
+  asTyped(text)
+    .replace("at", "@")
+    .replace("−", "-")
+    .replace(/(deg|°)$/, "")
+    .replace(/@0$/, "");
 const BEYOND = "too large to be written";
+const TAKEN = 6; // digits of a value that is taken into the form
+const HEAD = 26; // pixels above a plot, for what it shows
 const LINE = 14; // pixels between two names
 
 export function motionPanel(store, moved) {
@@ -76,13 +95,14 @@ export function motionPanel(store, moved) {
     },
   );
 
-  /** What was understood of an oscillation: its terms. */
+  /** What was understood of an oscillation, where that says more than its text: its terms. */
   function understood(name) {
     const one = motion?.inputs[name];
     if (!one || one.text !== store.state[name].trim()) return "amplitude, and @ phase in degrees";
     const term = ({ harmonic, amplitude, phase }) =>
       `${harmonic > 1 ? `${harmonic}: ` : ""}${inUnit(LIKE[name], amplitude)} at ${show(phase)}°`;
-    return one.harmonics.map(term).join(", ");
+    const terms = one.harmonics.map(term).join(", ");
+    return plainly(terms) === plainly(one.text) ? "" : terms;
   }
 
   /** Whether a remark stands below the field of an oscillation. */
@@ -101,7 +121,7 @@ export function motionPanel(store, moved) {
     const note = none ? about.impossible["ball normal"] : (fault ?? doubt ?? understood(name));
     return html`<div class="field ${fault ? "bad" : doubt ? "doubt" : ""}">
       <label for=${`motion-${name}`}
-        >${typeset(name === "normal" ? "ΔFz" : name)}
+        ><span class="symbol">${called(name)}</span>
         <span class="label">${MEANINGS[name]}</span></label
       >
       <input
@@ -142,12 +162,15 @@ export function motionPanel(store, moved) {
   const amount = (value, unit) => (value === null ? null : prefixed(value, unit));
 
   /** The text of an unknown at a value [SI], and what the state becomes with it. */
-  function found(unknown, value) {
+  function found(unknown, value, digits = TAKEN) {
     const [part, member] = unknown.split(".");
-    if (!member) return { text: inUnit(unknown, value, undefined, 6), use: { [unknown]: value } };
+    if (!member)
+      return { text: inUnit(unknown, value, undefined, digits), use: { [unknown]: value } };
     const [amplitude, phase] = store.state[part].split("@").map((one) => one.trim());
     const text =
-      member === "phase" ? `${show(value, 6)} deg` : inUnit(LIKE[part], value, undefined, 6);
+      member === "phase"
+        ? `${show(value, digits)} deg`
+        : inUnit(LIKE[part], value, undefined, digits);
     const whole = member === "phase" ? [amplitude, text] : [text, phase];
     return { text, more: { [part]: whole.filter(Boolean).join(" @ ") } };
   }
@@ -157,15 +180,16 @@ export function motionPanel(store, moved) {
     const { unknown, results, reachable } = solved;
     const [{ roots: all = [], reason }] = results;
     const line = ({ value }) => {
-      const { text, use = {}, more = {} } = found(unknown, value);
-      const words = `${UNKNOWNS[unknown]} = ${text}`;
+      const { use = {}, more = {} } = found(unknown, value);
+      const digits = store.state.digits === "all" ? TAKEN : 4;
+      const words = `${UNKNOWNS[unknown]} = ${found(unknown, value, digits).text}`;
       return html`<li>
         <b>${words}</b>
         <button
           class="use"
           type="button"
           aria-label=${`Use ${words}`}
-          @click=${() => moved(use, 6, more)}
+          @click=${() => moved(use, TAKEN, more)}
         >
           Use
         </button>
@@ -225,6 +249,9 @@ export function motionPanel(store, moved) {
     return [low - room, high + room];
   }
 
+  /** Says above a plot what it shows. */
+  const headed = (plot, words) => plot.text(words, plot.box.x, 14, "note", "start");
+
   /** The three forces over one period. */
   function paintForces() {
     const cycle = motion?.cycle;
@@ -235,8 +262,10 @@ export function motionPanel(store, moved) {
     forces.axes({
       x: { domain: [0, 1], log: false, title: "time, in periods" },
       y: { domain: padded([0, ...all]), log: false, title: "force [N]" },
+      top: HEAD,
       right: 30,
     });
+    headed(forces, "Forces");
     forces.path(
       [
         [0, 0],
@@ -268,7 +297,7 @@ export function motionPanel(store, moved) {
     const half =
       0.55 * Math.max(...[along, across].map((one) => Math.max(...one) - Math.min(...one)), 1e-9);
     const middle = (one) => (Math.max(...one) + Math.min(...one)) / 2;
-    const ratio = Math.max(path.width - 64, 1) / Math.max(path.height - 52, 1);
+    const ratio = Math.max(path.width - 76, 1) / Math.max(path.height - 42 - HEAD, 1);
     const [wide, tall] = ratio > 1 ? [half * ratio, half] : [half, half / ratio];
     path.axes({
       x: {
@@ -277,7 +306,9 @@ export function motionPanel(store, moved) {
         title: "x − v₀t [µm]",
       },
       y: { domain: [middle(across) - tall, middle(across) + tall], log: false, title: "y [µm]" },
+      top: HEAD,
     });
+    headed(path, "Way of the body");
     path.path(
       along.map((x, i) => [x, across[i]]),
       "curve",

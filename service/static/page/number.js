@@ -1,15 +1,17 @@
-// The number: µ_macro, as large as the page has it, with its deviation or its interval; the regime
-// in words; one line of advice, and what it assumes below that.
+// The number: µ, as large as the page has it, with its deviation or its interval; what of µ₀ is
+// left, and the regime, in words; one line of advice, and what it assumes below that.
 import { $, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import {
   about,
   around,
+  capital,
   digitsWithin,
   friction,
   inUnit,
   inWords,
   numberOf,
+  percent,
   prose,
   show,
   withDeviation,
@@ -19,9 +21,6 @@ const KNOWN = "k decides";
 const FEW = 4; // digits of the number
 
 const symbolOf = (name) => about.inputs[name === "omega" ? "f" : name].symbol;
-const capital = (words) => `${words[0].toUpperCase()}${words.slice(1)}`;
-/** A heading begins with a capital, but where a symbol begins it. */
-const heading = (row) => (row === KNOWN ? row : capital(row));
 
 /** The number as texts: the value, or both ends of an interval, and the deviation. */
 export function headline(answer, all) {
@@ -49,13 +48,28 @@ function shortOf(answer) {
   return value.includes(" ") ? `µ = ${value}` : `µ = ${value}, ${inWords(answer.regime)}`;
 }
 
+/** What of µ₀ is left, in words; of an interval both ends. */
+export function remains({ mu_macro_low: low, mu_macro_high: high, mu_ratio: ratio, inputs }) {
+  const { value: mu0 } = inputs.mu0;
+  if (ratio === 0) return "Nothing of µ₀ is left";
+  const [from, to] = (high > low ? [low / mu0, high / mu0] : [ratio, ratio]).map(percent);
+  if (from === to) return `${from === "100 %" ? "All" : to} of µ₀ is left`;
+  return `${from.replace(" %", "")} to ${to} of µ₀ is left`;
+}
+
+/** The regime, and which share of a period the contact sticks. */
+function going({ regime, stick_fraction: stick, mu_macro_low: low, mu_macro_high: high }) {
+  const share = stick > 0 && stick < 1 ? `: sticks for ${percent(stick)} of each period` : "";
+  return `${capital(inWords(regime))}${share}${high > low ? ", with k in the middle" : ""}`;
+}
+
 /** Where the deviation of the number comes from. */
 function variance({ std_share: shares }) {
   const parts = Object.entries(shares ?? {}).filter(([, share]) => share >= 0.005);
   const words = parts
     .sort(([, a], [, b]) => b - a)
     .map(([name, share]) => `${symbolOf(name)} ${Math.round(100 * share)} %`);
-  return words.length ? `the variance comes from ${words.join(", ")}.` : "";
+  return words.length ? `The variance comes from ${words.join(", ")}.` : "";
 }
 
 /** A remark in the page's signs; an interval of k is shown for this one. */
@@ -93,7 +107,7 @@ function sayings(answer) {
   };
   const rows = [...remarks, ...model.filter(({ row }) => !said.has(row))].map(({ row, text }) => ({
     row: named[row] ?? row,
-    words: sentence(text, inputs),
+    words: capital(sentence(text, inputs)),
     doubt: said.has(row) || DOUBTS.includes(row),
   }));
   const unit = inputs.k.unit ?? undefined;
@@ -117,25 +131,25 @@ export function numberPanel(store) {
     $("status").classList.toggle("bad", Boolean(trouble && !trouble.calm));
     for (const part of document.querySelectorAll(".result")) part.classList.toggle("old", old);
     if (!answer) {
-      render(html`<output id="mu" for="fields">…</output>`, $("number"));
+      const none = trouble && !trouble.calm ? "–" : "…";
+      render(html`<output id="mu" for="fields">${none}</output>`, $("number"));
       return;
     }
     const { value, std } = headline(answer, store.state.digits === "all");
     $("number").classList.toggle("long", value.length + (std ?? "").length / 2 > 12);
     const deviation = std ? html`<wbr /><span id="std"> ± ${std}</span>` : nothing;
     render(html`<output id="mu" for="fields">${value}</output>${deviation}`, $("number"));
-    const { stick_fraction: stick, regime } = answer;
-    const share = stick > 0 && stick < 1 ? `: sticks ${show(100 * stick, 2)} %` : "";
-    write("regime", `${capital(inWords(regime))}${share}`);
+    write("share", remains(answer));
+    write("regime", going(answer));
     write("short", shortOf(answer));
     if (store.dragged) return; // words may grow, and would move the map that is dragged
     const [first, ...rest] = sayings(answer);
-    write("advice", first ? `${heading(first.row)}: ${first.words}` : "");
+    const said = ({ row, words }) => html`<b>${capital(row)}.</b> ${words}`;
+    render(first ? said(first) : nothing, $("advice"));
     $("advice").classList.toggle("doubt", Boolean(first?.doubt));
     for (const part of document.querySelectorAll("[data-of]"))
       part.hidden = part.dataset.of !== answer.state.contact;
-    const line = ({ row, words, doubt }) =>
-      html`<li class=${doubt ? "doubt" : ""}><b>${heading(row)}:</b> ${words}</li>`;
+    const line = (one) => html`<li class=${one.doubt ? "doubt" : ""}>${said(one)}</li>`;
     render(rest.map(line), $("rows"));
   };
 }

@@ -5,7 +5,7 @@ import d3 from "./d3.js";
 const { axisBottom, axisLeft, axisRight, axisTop, drag, scaleLinear, scaleLog, select, line } = d3;
 
 const DIGIT = 7; // pixels of a figure beside an axis
-const MOST = 0.6; // of the width of a frame, which the name of a regime has
+const NARROW = 240; // pixels of a frame, in which the name of a regime has a line for each word
 const BAR = 40; // places of a bar, at which it may lie on a text
 const FINGER = 36; // pixels from the point, within which a finger takes it
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -205,12 +205,36 @@ export class Plot {
     this.marks = null;
   }
 
+  /** A line with a pale rim, which is seen on every colour. */
+  rimmed(shape, className) {
+    for (const kind of ["rim", className])
+      this.inside.append("path").attr("class", kind).attr("d", shape);
+  }
+
   path(points, className, where = this.inside) {
+    return where.append("path").attr("class", className).attr("d", this.shape(points));
+  }
+
+  shape(points) {
     const shape = line()
       .defined(([x, y]) => Number.isFinite(x) && Number.isFinite(y))
       .x(([x]) => this.x(x))
       .y(([, y]) => this.y(y));
-    return where.append("path").attr("class", className).attr("d", shape(points));
+    return shape(points);
+  }
+
+  /** The name of a regime about a place, with two lines where the frame is narrow. */
+  area(words, x, y) {
+    const last = words.lastIndexOf(" ");
+    if (this.box.width >= NARROW || last < 0) return this.text(words, x, y, "area");
+    const text = this.text("", x, y, "area");
+    for (const [i, line] of [words.slice(0, last), words.slice(last + 1)].entries())
+      text
+        .append("tspan")
+        .attr("x", x)
+        .attr("dy", i ? "1.1em" : 0)
+        .text(line);
+    return text;
   }
 
   /** A text at a place; a centred one of the lower layer is kept within the frame. */
@@ -232,18 +256,18 @@ export class Plot {
    */
   centre() {
     const { box, centred, svg } = this;
-    const halves = centred.map(([text]) => text.node().getComputedTextLength() / 2 + 3);
-    centred.forEach(([text, x], i) =>
-      text.attr("x", Math.min(Math.max(x, box.x + halves[i]), box.x + box.width - halves[i])),
-    );
+    const halves = centred.map(([text]) => text.node().getBBox().width / 2 + 3);
+    centred.forEach(([text, x], i) => {
+      const at = Math.min(Math.max(x, box.x + halves[i]), box.x + box.width - halves[i]);
+      text.attr("x", at).selectAll("tspan").attr("x", at);
+    });
     this.centred = [];
     this.texts = [];
     for (const text of svg.querySelectorAll(":is(.tag, .area, .mark, .note)")) {
       const { x, y, width, height } = text.getBBox();
       const place = [x - 1, y, x + width + 1, y + height];
       const left = this.texts.some((one) => !one.left && overlap(one.place, place));
-      const wide = text.matches(".area") && width > MOST * box.width;
-      this.texts.push({ text, place, left: left || wide });
+      this.texts.push({ text, place, left });
     }
   }
 
@@ -259,7 +283,7 @@ export class Plot {
     const [[left, foot], [right, top]] = ends;
     for (let i = 0; i <= BAR; i += 1)
       this.cover(left + (i / BAR) * (right - left), foot + (i / BAR) * (top - foot), 3);
-    return this.path([from, to], "deviation");
+    this.rimmed(this.shape([from, to]), "deviation");
   }
 
   /** Notes that something of the upper layer is drawn here. */

@@ -6,17 +6,7 @@ import { html, nothing, render, svg } from "../lib/lit-html.js";
 import { list } from "./meanings.js";
 import { post } from "./service.js";
 import { caseAround, inputsOf, kindOf } from "./state.js";
-import {
-  about,
-  friction,
-  inUnit,
-  inWords,
-  numberOf,
-  prefixed,
-  show,
-  typeset,
-  unitAt,
-} from "./words.js";
+import { about, friction, inUnit, inWords, numberOf, prefixed, show, unitAt } from "./words.js";
 
 /**
  * Tabs: buttons "tab-name" that show one of several parts; `chosen(name)` hears which, and the
@@ -48,6 +38,7 @@ function tabs(id, chosen = () => {}) {
   return (name) => turn(buttons.find((one) => one.id === `tab-${name}`));
 }
 
+const NONE_YET = html`<p class="hint">There is no number yet.</p>`;
 const MOST = 8; // digits that have room beside a unit
 
 /** The other numbers of a case, as `list` takes them. */
@@ -154,7 +145,7 @@ function bars({ gradient, mu_macro: mu, inputs, std_share: variance }) {
       ${shares.map(([name, share, part]) => {
         const width = (50 * Math.abs(share)) / most;
         return html`<tr>
-          <th scope="row">${typeset(about.inputs[name].symbol)}</th>
+          <th scope="row">${about.inputs[name].symbol}</th>
           <td>
             <svg class="bar" viewBox="0 0 100 10" preserveAspectRatio="none" aria-hidden="true">
               ${svg`
@@ -217,7 +208,8 @@ export function sidePanel(store, moved, found) {
     const typed = answer.inputs[unknown]?.unit;
     const [{ roots }] = results;
     const line = ({ value, mu_macro: mu, regime, power }) => {
-      const shown = inUnit(unknown, value, unitAt(unknown, value, typed), 6);
+      const digits = store.state.digits === "all" ? 6 : 4;
+      const shown = inUnit(unknown, value, unitAt(unknown, value, typed), digits);
       const text = `${about.inputs[unknown].symbol} = ${shown}`;
       const shaker = power ? `, shaker ${prefixed(power.oscillation, "W")}` : "";
       return html`<li>
@@ -267,13 +259,11 @@ export function sidePanel(store, moved, found) {
     render(names.map(option), $("unknown"));
     $("quantity").value = store.state.quantity;
     $("target").value = store.state.target;
+    for (const id of ["values", "bars"]) if (!answer) render(NONE_YET, $(id));
+    document.querySelector("[data-meanings=values]").disabled = !answer;
     if (!answer) return;
-    list("values", numbers(answer, store.state.digits === "all"));
-    const whole = (name) => html`<span class="whole">${name}</span>`;
-    render(
-      html`From the block ${whole(answer.source)} of the table ${whole(answer.table.id)}.`,
-      $("origin"),
-    );
+    const origin = `All are from the block ${answer.source} of the table ${answer.table.id}.`;
+    list("values", numbers(answer, store.state.digits === "all"), origin);
     render(bars(answer), $("bars"));
     compare();
   };

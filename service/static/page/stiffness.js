@@ -3,15 +3,18 @@ import { Channel } from "./ask.js";
 import { $, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { post } from "./service.js";
-import { about, inUnit, prefixed, prose, typeset } from "./words.js";
+import { about, called, inUnit, prefixed, prose } from "./words.js";
 
 const LENGTHS = ["radius", "diameter", "length"];
+/** What an empty field may hold, or means. */
 const SUCH_AS = {
-  radius: "5 mm",
-  diameter: "10 mm",
-  length: "10 mm",
-  E: "210 GPa",
-  E2: "210 GPa",
+  radius: "such as 5 mm",
+  diameter: "such as 10 mm",
+  length: "such as 10 mm",
+  E: "such as 210 GPa",
+  nu: "such as 0.3",
+  E2: "as body 1",
+  nu2: "as body 1",
 };
 const SIZES = ["radius", "diameter"];
 /** Of a body, two of which share a row. */
@@ -81,10 +84,12 @@ export function stiffnessPanel(store, moved) {
   }
 
   function field(name) {
-    const { unit, meaning, choices } = about.arguments[name];
+    const { meaning, choices } = about.arguments[name];
     const fault = faults.get(name);
     const doubt = doubted(name);
-    const below = fault ?? doubt ?? (understood(name) || meaning);
+    // what a body is made of has its meaning at its symbol: its row stays one of 40 px
+    const hint = BODIES.includes(name) ? "" : meaning;
+    const below = fault ?? doubt ?? (understood(name) || hint);
     const shared = { id: `argument-${name}` };
     const input = choices.length
       ? html`<select id=${shared.id} @change=${({ target }) => change(name, target.value)}>
@@ -93,16 +98,15 @@ export function stiffnessPanel(store, moved) {
       : html`<input
           id=${shared.id}
           spellcheck="false"
-          placeholder=${SUCH_AS[name] ? `such as ${SUCH_AS[name]}` : nothing}
+          placeholder=${SUCH_AS[name]}
           aria-invalid=${String(fault !== undefined)}
           aria-describedby=${`about-${name}`}
           .value=${typed[name] ?? ""}
           aria-label=${SIZES.includes(name) ? name : nothing}
           @change=${({ target }) => change(name, target.value)}
         />`;
-    const title = html`<label for=${shared.id}
-      >${typeset(name)}
-      <span class="label">${/\w/.test(unit) && !(name in SUCH_AS) ? unit : ""}</span></label
+    const title = html`<label for=${shared.id} title=${meaning}
+      ><span class="symbol">${called(name)}</span></label
     >`;
     return html`<div
       class="field ${fault ? "bad" : doubt ? "doubt" : ""} ${BODIES.includes(name) ? "" : "wide"}"
@@ -136,12 +140,11 @@ export function stiffnessPanel(store, moved) {
     return html`<div class="field wide">
       <label for=${`material-${number}`}>body ${number}</label>
       <select id=${`material-${number}`} @change=${take}>
-        <option value="">choose a material</option>
+        <option value="">${same ? "as body 1" : "choose a material"}</option>
         ${about.materials.rows.map(
           ({ name, E: modulus }) => html`<option value=${name}>${name}, ${modulus}</option>`,
         )}
       </select>
-      <p class="note">${same ? "Left out: both are of one material." : about.materials.source}</p>
     </div>`;
   }
 
@@ -173,10 +176,13 @@ export function stiffnessPanel(store, moved) {
                 </option>`,
             )}
           </select>
-          <p class="note">Fz is that of the form.</p>
         </div>
         ${of([...LENGTHS, "oscillation"])} ${materials(1, "E", "nu")} ${of(["E", "nu"])}
-        ${materials(2, "E2", "nu2")} ${of(["E2", "nu2"])}`,
+        ${materials(2, "E2", "nu2")} ${of(["E2", "nu2"])}
+        <p class="hint wide">
+          E is Young's modulus, ν Poisson's ratio; Fz is that of the form. Materials:
+          ${about.materials.source}.
+        </p>`,
       $("stiffness-fields"),
     );
     render(result(), $("stiffness-result"));

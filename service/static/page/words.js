@@ -1,6 +1,4 @@
 // Numbers and names for people: the one place where the page writes a value.
-import { html } from "../lib/lit-html.js";
-
 /** What the service says of inputs, contacts and geometries (names.json). */
 export const about = {};
 
@@ -100,6 +98,9 @@ export function textAt(answer, name, value, digits = 4) {
   return std ? `${text} ± ${show((100 * std) / before, 3)} %` : text;
 }
 
+/** A text without what makes no difference: blanks, u in place of µ. */
+export const asTyped = (text) => text.replaceAll(" ", "").replaceAll("µ", "u");
+
 /** A friction coefficient with so many digits, trailing zeros kept. */
 export function friction(value, digits) {
   if (value === null) return "–";
@@ -114,6 +115,12 @@ export function friction(value, digits) {
 export function withDeviation(value, std) {
   const places = Math.min(Math.max(1 - Math.floor(Math.log10(std)), 0), 12);
   return [value, std].map((one) => one.toFixed(places));
+}
+
+/** A share as a person says it; what is not all of it is below 100 %. */
+export function percent(share) {
+  const nines = -Math.floor(Math.log10(1 - share));
+  return `${show(100 * share, Math.min(Math.max(nines, 2), 4))} %`;
 }
 
 /** The digits of a value that its error bound leaves. */
@@ -152,6 +159,12 @@ const CALLED = {
   nu2: "ν₂",
 };
 
+/** A text in which no equation is broken over two lines. */
+export const whole = (text) =>
+  text
+    .replace(/ ([=≈]) |(?<=\d) (?=[µa-zA-Z])/g, (gap) => gap.replaceAll(" ", "\u00a0"))
+    .replaceAll("/", "/\u2060");
+
 /** A field of a request as the page calls it. */
 export function called(field) {
   if (Object.hasOwn(CALLED, field)) return CALLED[field];
@@ -161,16 +174,9 @@ export function called(field) {
 /** The address of a page of the guide, or of its source where no guide is built. */
 export const pageOf = (name) => `${about.guide}${name}${about.guide_ending}`;
 
+/** A sentence begins with a capital, but where a symbol begins it. */
+export const capital = (words) =>
+  /^(a |[a-z]{2})/.test(words) ? `${words[0].toUpperCase()}${words.slice(1)}` : words;
+
 /** A regime as a person names it. */
 export const inWords = (regime) => about.regimes[regime] ?? regime;
-
-const INDEX = { "₀": "0", "₂": "2", z: "z" };
-const LETTERS = { nu: "ν", nu2: "ν₂", E2: "E₂" };
-
-/** A symbol as it is typeset: letters slanted, indices below. */
-export function typeset(symbol) {
-  const [, upright, letter, index] = (LETTERS[symbol] ?? symbol).match(/^(Δ?)(\p{L}+?)([₀₂z]?)$/u);
-  return html`<span class="symbol"
-    >${upright}<i>${letter}</i>${index && html`<sub>${INDEX[index]}</sub>`}</span
-  >`;
-}

@@ -8,8 +8,7 @@ import vm from "node:vm";
 const STATIC = new URL("../../../service/static/", import.meta.url);
 for (const name of ["array", "format"])
   vm.runInThisContext(readFileSync(new URL(`lib/d3-${name}.min.js`, STATIC), "utf8"));
-// what lit-html and the state look for in a browser
-globalThis.document = { createTreeWalker: () => ({}), createComment: () => ({}) };
+// what the state looks for in a browser
 globalThis.addEventListener = () => {};
 const words = await import(new URL("page/words.js", STATIC));
 const state = await import(new URL("page/state.js", STATIC));
@@ -39,6 +38,14 @@ describe("a number for people", () => {
     [() => words.friction(0.1, 4), "0.1000"],
     [() => words.friction(0, 4), "0"],
     [() => words.friction(2.208e-5, 4), "2.208e-5"],
+    [() => words.percent(0.8016), "80 %"],
+    [() => words.percent(0.9989), "99.9 %"],
+    [() => words.percent(0.99996), "100 %"],
+    [() => words.percent(1), "100 %"],
+    [() => words.percent(0.0034), "0.34 %"],
+    [() => words.capital("a ball"), "A ball"],
+    [() => words.capital("k decides"), "k decides"],
+    [() => words.capital("v₀ is large"), "v₀ is large"],
     [() => words.withDeviation(0.240466, 0.01432).join(" ± "), "0.240 ± 0.014"],
     [() => words.withUnit("y0", "2.9", "um"), "2.9 µm"],
     [() => words.withUnit("f", "20", "kHz"), "20 kHz"],
