@@ -57,10 +57,11 @@ export function remains({ mu_macro_low: low, mu_macro_high: high, mu_ratio: rati
   return `${from.replace(" %", "")} to ${to} of µ₀ is left`;
 }
 
-/** The regime, and which share of a period the contact sticks. */
+/** The regime, and which share of a period the contact sticks; of an interval that in its middle. */
 function going({ regime, stick_fraction: stick, mu_macro_low: low, mu_macro_high: high }) {
-  const share = stick > 0 && stick < 1 ? `: sticks for ${percent(stick)} of each period` : "";
-  return `${capital(inWords(regime))}${share}${high > low ? ", with k in the middle" : ""}`;
+  const name = capital(inWords(regime));
+  if (high > low) return `${name} in the middle of k`;
+  return stick > 0 && stick < 1 ? `${name}: sticks for ${percent(stick)} of each period` : name;
 }
 
 /** Where the deviation of the number comes from. */
