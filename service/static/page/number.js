@@ -57,7 +57,7 @@ export function remains({ mu_macro_low: low, mu_macro_high: high, mu_ratio: rati
   return `${from.replace(" %", "")} to ${to} of µ₀ is left`;
 }
 
-/** The regime, and which share of a period the contact sticks; of an interval that in its middle. */
+/** The regime, and which share of a period the contact sticks; of an interval, in its middle. */
 function going({ regime, stick_fraction: stick, mu_macro_low: low, mu_macro_high: high }) {
   const name = capital(inWords(regime));
   if (high > low) return `${name} in the middle of k`;
