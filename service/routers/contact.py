@@ -78,7 +78,7 @@ def _points(member: str, data: bytes, measured: FitRequest) -> TableOfNumbers:
 
 def _as_read(points: TableOfNumbers) -> dict[str, Any]:
     return {
-        "columns": points.in_own_units,
+        "columns": points.as_written,
         "units": points.units,
         "lines": points.lines,
         "skipped_lines": points.skipped,

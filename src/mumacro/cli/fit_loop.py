@@ -13,8 +13,8 @@ from mumacro.errors import InputError, TextError
 from mumacro.fits.loop import fit_loop
 from mumacro.fits.loop_fitted import LoopFit
 from mumacro.inputs.case import read_one
+from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.fields import CONTACTS
-from mumacro.inputs.layout import ColumnNames
 from mumacro.inputs.text_tables import read_numbers
 
 EXAMPLE = "mumacro fit-loop loop.csv Fz=10N --displacement x --force Ft -o loop.png"

@@ -17,10 +17,12 @@ import pyarrow.dataset
 
 from mumacro.errors import TextError
 from mumacro.files.record_batch import FilesError
+from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.carried import units_of_fields
-from mumacro.inputs.layout import GAPS, ColumnNames, Dialect, Layout
+from mumacro.inputs.cells import GAPS, joined
+from mumacro.inputs.layout import Dialect, Layout
 from mumacro.inputs.numbers import Signs
-from mumacro.inputs.text_tables import Rows, TextTable, joined
+from mumacro.inputs.text_tables import Rows, TextTable
 from mumacro.kernel.arrays import Places
 
 #: endings of files that are written, and their format
@@ -188,8 +190,8 @@ class TextSource:
                 )
         # Excel reads the signs of UTF-8 where it begins with a mark
         self.has_mark = self.layout.encoding != "utf-8"
-        self.where = f"{files[0]}: line {self.layout.head}: "
-        self.sep = self.layout.cell_sep
+        self.where = f"{files[0]}: line {self.layout.line}: "
+        self.sep = self.tables[0].account.sep
         self.schema = pa.schema([(head, pa.string()) for head in self.layout.heads])
 
     @property

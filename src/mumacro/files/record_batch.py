@@ -14,13 +14,13 @@ import pyarrow.compute as pc
 
 from mumacro.answer import BAND, DEFAULT, TEXTS
 from mumacro.errors import InputError, MumacroError
+from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, other_amplitude
+from mumacro.inputs.cells import in_si, numbers_of
 from mumacro.inputs.fields import AMPLITUDE, ENDS, GAP, LIKE, SI, SPRING, Kind, kind_of, refusal
-from mumacro.inputs.layout import ColumnNames
 from mumacro.inputs.names import absent, find_heads, meant_by
-from mumacro.inputs.numbers import TOO_LARGE, Signs
-from mumacro.inputs.text_tables import numbers_of
+from mumacro.inputs.numbers import Signs
 from mumacro.inputs.units import Scale, scale_of, split_unit
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.notes import Note
@@ -327,7 +327,9 @@ def numbers(
     ):
         field = name.removeprefix("std_")
         cells = pc.cast(array, pa.string()).to_pylist()
-        return numbers_of(cells, LIKE.get(field, field), signs, scale)
+        values, faults = numbers_of(cells, LIKE.get(field, field), signs, scale)
+        si, too_large = in_si(values, scale)
+        return values, si, faults | too_large
     is_number = (
         pa.types.is_integer(arrow_type)
         or pa.types.is_floating(arrow_type)
@@ -337,12 +339,7 @@ def numbers(
         raise FilesError(f"the column {name} holds {arrow_type}, not numbers")
     column = pc.fill_null(pc.cast(array, pa.float64(), safe=False), math.nan)
     values: Array = column.to_numpy(zero_copy_only=False)
-    # a power of ten below one divides, so that 2 um is the double 2e-6
-    with np.errstate(over="ignore"):
-        si: Array = values if scale == Scale() else values * scale.times / scale.over
-    beyond = np.isinf(si) & np.isfinite(values)  # a large stiffness is not a rigid contact
-    si = np.where(beyond, math.nan, si) if beyond.any() else si
-    return values, si, dict.fromkeys(np.flatnonzero(beyond).tolist(), TOO_LARGE)
+    return values, *in_si(values, scale)
 
 
 def _field_and_reason(error: InputError) -> tuple[str, str]:

@@ -11,8 +11,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet
 
-from mumacro.inputs.layout import BLANKS, Dialect
-from mumacro.inputs.text_tables import joined
+from mumacro.inputs.cells import BLANKS, joined
+from mumacro.inputs.layout import Dialect
 
 
 def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:

@@ -7,11 +7,13 @@ from typing import Any
 import pytest
 
 from mumacro.errors import TextError
+from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.case import read
+from mumacro.inputs.cells import in_si, numbers_of
 from mumacro.inputs.doubts import remarks
-from mumacro.inputs.layout import ColumnNames, Dialect
+from mumacro.inputs.layout import Dialect
 from mumacro.inputs.numbers import TOO_LARGE, Signs
-from mumacro.inputs.text_tables import TableOfNumbers, read_cell, read_numbers
+from mumacro.inputs.text_tables import TableOfNumbers, read_numbers
 from mumacro.inputs.units import scale_of
 from tests.support.comparing import close
 
@@ -54,9 +56,11 @@ def test_a_cell_beyond_the_head_is_not_dropped() -> None:
 
 def test_a_number_that_is_too_large_in_si_is_no_rigid_contact() -> None:
     scale: Any = scale_of("k", "N/um")
-    assert read_cell("k", "1e301", Signs(".", None), scale) == close(1e307, rel=1e-15)
-    with pytest.raises(ValueError, match=TOO_LARGE):
-        read_cell("k", "1e305", Signs(".", None), scale)
+    values, _ = numbers_of(["1e301", "1e305"], "k", Signs(".", None))
+    si, faults = in_si(values, scale)
+    assert si[0] == close(1e307, rel=1e-15)
+    assert math.isnan(si[1])
+    assert faults == {1: TOO_LARGE}
 
 
 @pytest.mark.parametrize(

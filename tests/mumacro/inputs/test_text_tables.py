@@ -22,11 +22,13 @@ from hypothesis import strategies as st
 from mumacro.errors import InputError, TextError
 from mumacro.fits.fit import fit
 from mumacro.fits.measured_points import read_points
+from mumacro.inputs.account import ColumnNames
+from mumacro.inputs.cells import BLANKS, GAPS, numbers_of, read_cell
 from mumacro.inputs.decoding import Text, encoding_of
-from mumacro.inputs.layout import BLANKS, GAPS, ColumnNames, Dialect
+from mumacro.inputs.layout import Dialect
 from mumacro.inputs.names import absent
 from mumacro.inputs.numbers import Signs, evidence
-from mumacro.inputs.text_tables import TableOfNumbers, read_cell, read_numbers
+from mumacro.inputs.text_tables import TableOfNumbers, read_numbers
 from mumacro.inputs.units import Scale
 from tests.support.comparing import close
 
@@ -76,7 +78,7 @@ def read(text: str | bytes, **options: Any) -> TableOfNumbers:
     data = text if isinstance(text, bytes) else text.encode()
     return read_numbers(
         data,
-        ColumnNames(dict(list(POINTS.like.items())[:2]), POINTS.required_groups),
+        ColumnNames(dict(list(POINTS.input_of.items())[:2]), POINTS.required_groups),
         Dialect(**options),
     )
 
@@ -315,28 +317,31 @@ def test_what_is_no_encoding_of_texts_is_refused(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("cell", "si"),
+    ("cell", "number"),
     [
-        ("1.5", 1.5e-3),
-        ("1.0D-3", 1e-6),
-        ("1.0d+03", 1.0),
-        ("−2", -2e-3),
-        ("+2", 2e-3),
-        ("1,234.5", 1.2345),
-        ("12 345", 12.345),
-        ("12\u202f345.5", 12.3455),
-        ("1'000", 1.0),
-        (" 7 ", 7e-3),
+        ("1.5", 1.5),
+        ("1.0D-3", 1e-3),
+        ("1.0d+03", 1000.0),
+        ("−2", -2.0),
+        ("+2", 2.0),
+        ("1,234.5", 1234.5),
+        ("12 345", 12345.0),
+        ("12\u202f345.5", 12345.5),
+        ("1'000", 1000.0),
+        (" 7 ", 7.0),
     ],
 )
-def test_numbers_in_cells(cell: str, si: float) -> None:
-    value = read_cell("v0", cell, Signs(".", None), Scale(over=1e3))
-    assert value == close(si, rel=1e-15)
+def test_numbers_in_cells(cell: str, number: float) -> None:
+    signs = Signs(".", None)
+    assert read_cell("v0", cell, signs) == number
+    values, faults = numbers_of([cell], "v0", signs)
+    assert (values.tolist(), faults) == ([number], {})
 
 
 def test_per_cent_in_a_cell_comes_before_the_unit_of_the_column() -> None:
     for scale in (Scale(), Scale(over=1e2)):
-        assert read_cell("mu_macro", "7 %", Signs(".", None), scale) == close(0.07, rel=1e-15)
+        number = read_cell("mu_macro", "7 %", Signs(".", None), scale)
+        assert scale.si(number) == close(0.07, rel=1e-15)
 
 
 @pytest.mark.parametrize("gap", sorted(GAPS))
@@ -416,9 +421,9 @@ def test_units_stand_beside_the_names_or_in_a_legend(text: str) -> None:
         ("# v0: [N]\nv0,mu_macro\n" + TWO, 1, "no unit of v0"),
         ("# speed unit: mm/s\nv0,mu_macro\n" + TWO, 1, "v0 [mm/s]"),
         ("# Sliding speed [mm/s]\nv0,mu_macro\n" + TWO, 1, "v0 [mm/s]"),
-        ("v0,mu_macro\nmm/s,-,N\n" + TWO, 2, "3 units"),
+        ("v0,mu_macro\nmm/s,-,N\n" + TWO, 2, "cannot be assigned"),
         ("mm/s,-\nv0,mu_macro\nm/s,-\n" + TWO, 3, "line 1 says mm/s"),
-        (f"v0,mu_macro\n{TWO}# v0: speed [mm/s]\n", 4, "not in the header"),
+        (f"v0,mu_macro\n{TWO}# v0: speed [mm/s]\n", 4, "the rows before are in m/s"),
     ],
 )
 def test_units_that_cannot_be_assigned_are_refused(text: str, line: int, part: str) -> None:

@@ -1,0 +1,220 @@
+"""The account of a table: what each of its lines is.
+
+A line is before the header, the header, units, data, a comment, a ruler or empty.  What can be none
+of these is refused with its line, and with the option that leaves it out: another header, another
+segment, a row of statistics.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from mumacro.inputs.cells import (
+    BLANKS,
+    begins_as_number,
+    is_comment,
+    joined,
+    may_be_value,
+    split_header,
+    split_row,
+    uncommented,
+)
+from mumacro.inputs.column_units import ColumnUnits
+from mumacro.inputs.decoding import TextError
+from mumacro.inputs.headings import heading
+from mumacro.inputs.units import split_unit
+
+#: what LabVIEW writes behind each of its headers
+END_OF_HEADER = "***End_of_Header***"
+# what a row of statistics begins with, in small letters
+_STATISTICS = re.compile(
+    r"(?:mean|average|avg|median|mittel(?:wert)?|mw|moyenne|min(?:imum)?|max(?:imum)?|sum|total"
+    r"|summe|range|spannweite|variance|varianz|cov|cv|s\.?d\.?|rsd|count"
+    r"|st(?:andar)?d\.?[ _-]?(?:dev(?:iation)?\.?|err(?:or)?\.?)?|st\.?[ _-]?dev(?:iation)?\.?"
+    r"|standardabweichung|stabw"
+    r"|[ée]cart[ -]type)(?:\.? ?(?:value|wert|of .{1,20}))?\W*"
+)
+#: the first two letters of each of these
+BEGIN_OF_STATISTICS = frozenset(
+    (
+        *("me", "av", "mi", "mw", "mo", "ma", "su", "to", "ra"),
+        *("sp", "va", "co", "cv", "sd", "rs", "st", "ec", "s."),
+    )
+)
+# a line that is drawn between rows has nothing but these signs, and some of them together
+_OF_RULER, _RULER = "-=_+|: \t,;", re.compile(r"-{4}|={3}|\+-{2}|\|:?-{3}")
+
+
+class ColumnNames(NamedTuple):
+    """The columns of a table that mean something."""
+
+    input_of: Mapping[str, str]  #: by name, the input whose units it has
+    required_groups: Sequence[Sequence[str]]  #: of each, one name must be there
+
+    def are_all_in(self, heads: Sequence[str]) -> bool:
+        """Return whether heads name all that is needed."""
+        names = {split_unit(head)[0] for head in heads}
+        return all(names.intersection(group) for group in self.required_groups)
+
+    def may_be_in(self, text: str) -> bool:
+        """Return whether a text has all names that are needed, as words or within others."""
+        return all(any(name in text for name in names) for names in self.required_groups)
+
+
+class Header(NamedTuple):
+    """The line with the names of the columns."""
+
+    index: int  #: of its line, from 0
+    end: int  #: index of the line behind it
+    sep: str
+    cells: list[str]
+
+
+class Account:
+    """What each line behind the header is."""
+
+    def __init__(
+        self,
+        header: Header,
+        units: ColumnUnits,
+        column_names: ColumnNames,
+        dashes: str = "--",
+        labview: bool = False,
+        first: int | None = None,
+    ) -> None:
+        self.header, self.units, self._column_names = header, units, column_names
+        self._dashes, self._labview = dashes, labview
+        self.width = len(units.names)
+        #: what separates the cells of rows, once tabs stand in place of blanks
+        self.sep = "\t" if header.sep == BLANKS else header.sep
+        # rows of LabVIEW may end before the last column
+        self.may_lack_last = labview and units.names[-1:] == ["Comment"]
+        self.first = first  #: the line of the first row, once it is known
+        # every header has this name: looked for first, as most lines lack it
+        groups = column_names.required_groups
+        self.name = max((names[0] for names in groups if len(names) == 1), key=len, default="")
+        self.repeated: list[int] = []  #: lines that have the header or its units again
+        self.skipped: list[int] = []  #: those, comments and rulers
+
+    def remedy(self, line: int) -> str:
+        """Return the remedy for a line that does not belong to the rows."""
+        if not self._dashes:
+            return "give the rows alone"
+        if self.first is not None and line > self.first:
+            return f"{self._dashes}rows {self.first}..{line - 1} reads those before it"
+        return f"{self._dashes}rows A..B says which lines are data"
+
+    def row(self, line: int, text: str) -> tuple[str, str | None] | None:
+        """Return the text of a row, with as many cells as the header, and its fault; None for a
+        line that is no row."""
+        width, empty = self.width, self.sep * (self.width - 1)
+        if text.count(self.sep) > 2 * width + 1000 and not is_comment(text):  # not taken apart
+            return empty, irregular(text.count(self.sep) + 1, width)
+        if not self.is_row(line, text):
+            return None
+        cells = split_row(text, self.sep)
+        if len(cells) == width:
+            return text, None
+        if len(cells) > width and not any(map(str.strip, cells[width:])):
+            return joined(cells[:width], self.sep), None
+        if len(cells) == width - 1 and self.may_lack_last:
+            return text + self.sep, None
+        return empty, irregular(len(cells), width)
+
+    def is_row(self, line: int, text: str) -> bool:
+        """Return whether a line is a row; TextError where it can be nothing at all."""
+        if not text.strip(f" \t{self.header.sep}"):
+            return False
+        if self._may_be_header(text) and self._repeats_header(line, text):
+            return self._skip(line, again=True)
+        if is_comment(text) and not self._is_whole_row(text):
+            if "\n" in text:
+                raise TextError(f"line {line}: a quote in a comment is not closed: leave it out")
+            self.units.take(line, text, self._remedy_of_units(line))
+            return self._skip(line)
+        if not text.strip(_OF_RULER) and _RULER.search(text):
+            return self._skip(line)
+        cells = [cell.strip() for cell in self._cells(text)]
+        first = next((cell for cell in cells if cell), "")
+        if names_statistics(first):
+            what = f"{first!r} begins a row of statistics"
+            raise TextError(f"line {line}: {what}: {self.remedy(line)}")
+        filled = [cells[i] for i in self.units.inputs if i < len(cells) and cells[i]]
+        may_be_units = all(not begins_as_number(cell) or cell == "1" for cell in filled)
+        if may_be_units and self.units.take_row(line, text, self._remedy_of_units(line), True):
+            return self._skip(line, again=self.first is not None)
+        if not any(map(may_be_value, filled or [first])):
+            shown = " ".join(text.split())[:60]
+            remedy = self.remedy(line)
+            raise TextError(f"line {line}: {shown!r} is neither a row nor a comment: {remedy}")
+        if self.first is None:
+            self.first = line
+        self.units.rows_begun = True
+        return True
+
+    def _skip(self, line: int, again: bool = False) -> bool:
+        """Account for a line that is no row."""
+        self.skipped.append(line)
+        if again:
+            self.repeated.append(line)
+        return False
+
+    def _cells(self, text: str) -> list[str]:
+        """Return the cells of a line, which may still have blanks between them."""
+        if self.header.sep == BLANKS and self.sep not in text:
+            return split_header(text, BLANKS)
+        return split_row(text, self.sep)
+
+    def _is_whole_row(self, text: str) -> bool:
+        """Return whether a line that begins like a comment is a row, whose first cell is a name
+        such as #1."""
+        cells = self._cells(text)
+        return (
+            0 not in self.units.inputs
+            and len(cells) == self.width > 1
+            and any(map(begins_as_number, cells[1:]))
+        )
+
+    def _remedy_of_units(self, line: int) -> str:
+        return "leave one of them out" if self.first is None else self.remedy(line)
+
+    def _may_be_header(self, text: str) -> bool:
+        """Return whether a text has all names that a header needs, or begins another segment of
+        LabVIEW."""
+        if self._labview and END_OF_HEADER in text:
+            return True
+        return self.name in text and self._column_names.may_be_in(text)
+
+    def _repeats_header(self, line: int, text: str) -> bool:
+        """Return whether a line is the header again; TextError where it is another one."""
+        if text.startswith(END_OF_HEADER):
+            raise TextError(f"line {line} begins another segment: {self.remedy(line)}")
+        header, units = self.header, self.units
+        cells = split_header(uncommented(text), header.sep)
+        if cells[: len(header.cells)] == header.cells:
+            return True
+        heads = [heading(cell, self._column_names.input_of) for cell in cells]
+        if not self._column_names.are_all_in(heads):
+            return False
+        columns = [split_unit(head) for head in heads[: self.width]]
+        if [name for name, _ in columns] == units.names and all(
+            units.agrees(i, columns[i][1]) for i in units.inputs
+        ):
+            return True
+        what = "is another header, with other names or units"
+        raise TextError(f"line {line} {what}: {self.remedy(line)}")
+
+
+def names_statistics(text: str) -> bool:
+    """Return whether a text is what a row of statistics begins with.
+
+    >>> names_statistics("Std. dev."), names_statistics("motor")
+    (True, False)
+    """
+    return len(text) < 40 and _STATISTICS.fullmatch(text.lower()) is not None
+
+
+def irregular(count: int, width: int) -> str:
+    """Return what is wrong with a row of so many cells."""
+    cells = "cell" if count == 1 else "cells"
+    return f"has {count:,} {cells}, the header has {width:,}"
