@@ -12,8 +12,8 @@ from mumacro.cli.common import ImpossibleError, OneLineParser, UsageError, as_js
 from mumacro.errors import InputError, TextError
 from mumacro.fits.loop import fit_loop
 from mumacro.fits.loop_fitted import LoopFit
-from mumacro.inputs.case import read_one
 from mumacro.inputs.account import ColumnNames
+from mumacro.inputs.case import read_one
 from mumacro.inputs.fields import CONTACTS
 from mumacro.inputs.text_tables import read_numbers
 

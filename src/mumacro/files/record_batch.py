@@ -327,9 +327,9 @@ def numbers(
     ):
         field = name.removeprefix("std_")
         cells = pc.cast(array, pa.string()).to_pylist()
-        values, faults = numbers_of(cells, LIKE.get(field, field), signs, scale)
-        si, too_large = in_si(values, scale)
-        return values, si, faults | too_large
+        numbers, faults = numbers_of(cells, LIKE.get(field, field), signs, scale)
+        si, too_large = in_si(numbers, scale)
+        return numbers, si, faults | too_large
     is_number = (
         pa.types.is_integer(arrow_type)
         or pa.types.is_floating(arrow_type)

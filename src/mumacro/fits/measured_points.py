@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from mumacro.errors import InputError
+from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.cases import check, columns_of, library_of, no_such_input, select
 from mumacro.inputs.columns import to_si
 from mumacro.inputs.doubts import UNITS, remarks
-from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.fields import AMPLITUDE, LIKE, NAMES, kind_of
 from mumacro.inputs.layout import Dialect
 from mumacro.inputs.names import unknown_name

@@ -9,19 +9,19 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from mumacro.errors import TextError
 from mumacro.inputs.cells import (
     BLANKS,
-    begins_as_number,
     is_comment,
     joined,
     may_be_value,
     split_header,
     split_row,
+    starts_as_number,
     uncommented,
 )
 from mumacro.inputs.column_units import ColumnUnits
-from mumacro.inputs.decoding import TextError
-from mumacro.inputs.headings import heading
+from mumacro.inputs.names import heading
 from mumacro.inputs.units import split_unit
 
 #: what LabVIEW writes behind each of its headers
@@ -64,8 +64,8 @@ class ColumnNames(NamedTuple):
 class Header(NamedTuple):
     """The line with the names of the columns."""
 
-    index: int  #: of its line, from 0
-    end: int  #: index of the line behind it
+    start: int  #: its line, from 0
+    end: int  #: the line behind it
     sep: str
     cells: list[str]
 
@@ -140,7 +140,7 @@ class Account:
             what = f"{first!r} begins a row of statistics"
             raise TextError(f"line {line}: {what}: {self.remedy(line)}")
         filled = [cells[i] for i in self.units.inputs if i < len(cells) and cells[i]]
-        may_be_units = all(not begins_as_number(cell) or cell == "1" for cell in filled)
+        may_be_units = all(not starts_as_number(cell) or cell == "1" for cell in filled)
         if may_be_units and self.units.take_row(line, text, self._remedy_of_units(line), True):
             return self._skip(line, again=self.first is not None)
         if not any(map(may_be_value, filled or [first])):
@@ -172,7 +172,7 @@ class Account:
         return (
             0 not in self.units.inputs
             and len(cells) == self.width > 1
-            and any(map(begins_as_number, cells[1:]))
+            and any(map(starts_as_number, cells[1:]))
         )
 
     def _remedy_of_units(self, line: int) -> str:

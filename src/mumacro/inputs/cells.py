@@ -9,8 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from mumacro.inputs.fields import QUANTITY_OF, RIGID, is_rigid
-from mumacro.inputs.numbers import TOO_LARGE, read_number, split_number, tidy
-from mumacro.inputs.signs import Signs
+from mumacro.inputs.numbers import TOO_LARGE, Signs, read_number, split_number, tidy
 from mumacro.inputs.units import QUANTITIES, Scale, canonical, scale_of
 from mumacro.kernel.arrays import Array
 
@@ -95,7 +94,7 @@ def joined(cells: Iterable[object], sep: str) -> str:
     return stream.getvalue()[:-1]
 
 
-def begins_as_number(cell: str) -> bool:
+def starts_as_number(cell: str) -> bool:
     """Return whether a cell begins as numbers do."""
     return cell.lstrip("+-−., ")[:1].isdigit()
 
@@ -103,7 +102,7 @@ def begins_as_number(cell: str) -> bool:
 def may_be_value(cell: str) -> bool:
     """Return whether a cell may be the value of an input, a written gap or a formula."""
     text = cell.strip()
-    return begins_as_number(text) or text.lower() in GAPS or is_rigid(text) or text[:1] == "="
+    return starts_as_number(text) or text.lower() in GAPS or is_rigid(text) or text[:1] == "="
 
 
 def is_unit(text: str) -> bool:

@@ -8,18 +8,18 @@ refused with its line.
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
+from mumacro.errors import TextError
 from mumacro.inputs.cells import (
     BLANKS,
     NO_UNIT,
-    begins_as_number,
     is_comment,
     is_unit,
     split_header,
+    starts_as_number,
     uncommented,
 )
-from mumacro.inputs.decoding import TextError
-from mumacro.inputs.headings import heading, meant_by, unit_in_si
-from mumacro.inputs.units import Scale, scale_of, split_unit
+from mumacro.inputs.names import heading, meant_by
+from mumacro.inputs.units import Scale, scale_of, split_unit, unit_of
 
 SI_UNIT = Scale()
 _LEAVE_ONE = "leave one of them out"
@@ -78,7 +78,7 @@ class ColumnUnits:
 
     def unit(self, i: int) -> str:
         """Return the unit of an input's column."""
-        return self._units.get(i, ("", None))[0] or unit_in_si(self.names[i])
+        return self._units.get(i, ("", None))[0] or unit_of(self.names[i])
 
     def agrees(self, i: int, unit: str | None) -> bool:
         """Return whether a unit is that of an input's column; None is that of SI."""
@@ -136,7 +136,7 @@ class ColumnUnits:
         units = ["" if _LABEL.fullmatch(unit) else unit for unit in units]
         filled = [unit for unit in units if unit not in NO_UNIT]
         known = [unit for unit in filled if is_unit(unit)]
-        if not known or any(map(begins_as_number, filled)):  # or a setting with its unit
+        if not known or any(map(starts_as_number, filled)):  # or a setting with its unit
             return None
         if not any(units[width:]):
             units, cells = units[:width], cells[:width]
@@ -208,9 +208,9 @@ class ColumnUnits:
         for column in _ECSV_COLUMN.finditer(text[:1_000_000]):
             name, unit = (pattern.search(column[0]) for pattern in (_ECSV_NAME, _ECSV_UNIT))
             if name and unit and name[1].strip() in self.names:
-                line = next(number for start, number in reversed(starts) if start <= column.start())
+                number = next(n for start, n in reversed(starts) if start <= column.start())
                 place = self.names.index(name[1].strip())
-                self._take_one(line, place, unit[1].strip(), _LEAVE_ONE)
+                self._take_one(number, place, unit[1].strip(), _LEAVE_ONE)
 
 
 def units_in_legend(line: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -226,7 +226,7 @@ def units_in_legend(line: str, names: Sequence[str]) -> Iterator[tuple[str, str]
     first, *cells = _BETWEEN_CELLS.split(uncommented(line))
     if first.strip(" \"'") in names:  # a line for each column, with cells of its own
         texts = [cell.strip(" []()\"'") for cell in cells]
-        numbers = [i for i, text in enumerate(texts) if begins_as_number(text)]
+        numbers = [i for i, text in enumerate(texts) if starts_as_number(text)]
         units = [text for text in texts[: min(numbers, default=None)] if is_unit(text)]
         if len(units := [unit for unit in units if unit not in NO_UNIT]) == 1:
             yield first.strip(" \"'"), units[0]

@@ -10,19 +10,20 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import NamedTuple
 
+from mumacro.errors import TextError
 from mumacro.inputs.account import END_OF_HEADER, Account, ColumnNames, Header
 from mumacro.inputs.cells import (
     BLANKS,
     MOST_COLUMNS,
-    begins_as_number,
     is_comment,
     split_header,
+    starts_as_number,
     uncommented,
 )
 from mumacro.inputs.column_units import ColumnUnits
-from mumacro.inputs.decoding import NAMES, TextError
-from mumacro.inputs.headings import heading, meant_by
-from mumacro.inputs.signs import Signs
+from mumacro.inputs.decoding import NAMES
+from mumacro.inputs.names import heading, meant_by
+from mumacro.inputs.numbers import Signs
 
 #: separators of the cells, by the name that an option has
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t", "blanks": BLANKS}
@@ -75,7 +76,7 @@ class Layout(NamedTuple):
     @property
     def line(self) -> int:
         """The line of the header."""
-        return self.header.index + 1
+        return self.header.start + 1
 
     @property
     def heads(self) -> list[str]:
@@ -154,12 +155,12 @@ def find_layout(
         units.take_cells(declared.units + 1, ["", *cells[1:]])
     if column_names.are_all_in(units.heads):
         if declared.units is None:
-            _take_above(units, lines[: header.index], dialect.skip)
+            _take_above(units, lines[: header.start], dialect.skip)
         end = _first_row(account, lines, dialect)
     elif dialect.rows:
         end = dialect.rows[0] - 1
     before = [i for i in range(min(end, len(lines))) if lines[i].strip()]
-    is_header = range(header.index, header.end)
+    is_header = range(header.start, header.end)
     return Layout(
         encoding,
         header,
@@ -233,15 +234,15 @@ def _find_header(
     seps = (sep,) if sep else tuple(SEPARATORS.values())
     candidates = [*islice(_headers_in(lines, dialect.skip, seps, column_names), 20)]
     if dialect.rows:
-        candidates = [one for one in candidates if one.index + 1 < dialect.rows[0]][::-1]
+        candidates = [one for one in candidates if one.start + 1 < dialect.rows[0]][::-1]
     header = next((one for one in candidates if _fits(one, lines, declared.labview)), None)
     header = header or (candidates[0] if candidates else _likely_header(lines, dialect.skip, seps))
     if not dialect.rows:
         for one in candidates:
-            if one.index < header.index:
+            if one.start < header.start:
                 _refuse_rows_between(one, header, lines, dialect)
     for one in candidates:  # the names in a comment may stand above the header itself
-        between = lines[header.index : one.index]
+        between = lines[header.start : one.start]
         if between and all(is_comment(line) or not line.strip() for line in between):
             return one
     return header
@@ -251,13 +252,13 @@ def _refuse_rows_between(
     before: Header, header: Header, lines: list[str], dialect: Dialect
 ) -> None:
     """Refuse a table with rows below a header that did not fit them, before the one that fits."""
-    for i in range(before.end, header.index):
+    for i in range(before.end, header.start):
         cells = [] if is_comment(lines[i]) else split_header(lines[i], before.sep)
-        if len(cells) > 1 and any(map(begins_as_number, cells)):
-            skip = f"{dialect.dashes}skip {header.index} leaves them out"
+        if len(cells) > 1 and any(map(starts_as_number, cells)):
+            skip = f"{dialect.dashes}skip {header.start} leaves them out"
             raise TextError(
                 f"line {i + 1}: rows of a segment stand between the headers of lines "
-                f"{before.index + 1} and {header.index + 1}: "
+                f"{before.start + 1} and {header.start + 1}: "
                 f"{skip if dialect.dashes else 'give the rows of one'}"
             )
 
@@ -315,10 +316,10 @@ def _likely_header(lines: Sequence[str], skip: int, seps: Sequence[str]) -> Head
                 continue
             alike = sum(meant_by(cell, loosely=False) is not None for cell in cells[:200])
             below = split_header(lines[i + 1][:10_000], sep) if i + 1 < len(lines) else []
-            numbers = sum(map(begins_as_number, below))
+            numbers = sum(map(starts_as_number, below))
             is_above = len(below) == len(cells) and numbers > len(cells) // 2
             score = alike + 0.5 * is_above + 0.01 * (sep in lines[i])
-            if not any(map(begins_as_number, cells)) and score > most:
+            if not any(map(starts_as_number, cells)) and score > most:
                 best, most = Header(i, i + 1, sep, cells), score
     if best is not None:
         return best

@@ -2,7 +2,7 @@
 
 The way of a line: :mod:`mumacro.inputs.decoding` makes lines of bytes; ``layout`` finds the
 separator and the header, ``column_units`` the units; ``account`` says what each line is; here the
-rows are cut out; ``signs`` finds the decimal separator, and ``cells`` reads the numbers.
+rows are cut out; ``numbers`` finds the decimal separator, and ``cells`` reads the numbers.
 """
 
 import csv
@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mumacro.errors import TextError
 from mumacro.inputs.account import (
     BEGIN_OF_STATISTICS,
     Account,
@@ -23,10 +24,10 @@ from mumacro.inputs.account import (
     names_statistics,
 )
 from mumacro.inputs.cells import BLANKS, MOST_COLUMNS, in_si, is_comment, numbers_of, split_row
-from mumacro.inputs.decoding import LONGEST, Piece, Text, TextError, file_pieces
-from mumacro.inputs.headings import absent, find_heads
+from mumacro.inputs.decoding import LONGEST, Piece, Text, file_pieces
 from mumacro.inputs.layout import LOOKED_AT, Dialect, find_layout
-from mumacro.inputs.signs import Cell
+from mumacro.inputs.names import absent, find_heads
+from mumacro.inputs.numbers import Cell
 from mumacro.inputs.workbooks import BEGIN, SEP, read_sheet
 from mumacro.kernel.arrays import Array, Places
 
@@ -75,7 +76,7 @@ class Most(NamedTuple):
 
         >>> Most(cell=3).check(Piece(7, "a,b\\na,abcd"))
         Traceback (most recent call last):
-        mumacro.inputs.decoding.TextError: line 8: a cell may have up to 3 characters
+        mumacro.errors.TextError: line 8: a cell may have up to 3 characters
         """
         for number, line in enumerate(piece.lines, piece.first):
             if len(line) > self.cell and max(map(len, _BETWEEN.split(line))) > self.cell:
@@ -378,7 +379,7 @@ def _sheet_in(
     return data, dialect._replace(sep=SEP, encoding="utf-8"), said
 
 
-class Table(NamedTuple):
+class TableOfNumbers(NamedTuple):
     """Columns of numbers that were read."""
 
     columns: dict[str, Array]  #: by name, in SI, (n,)
@@ -389,18 +390,19 @@ class Table(NamedTuple):
     read_as: str  #: what was found out, see :meth:`mumacro.inputs.layout.Layout.described`
 
 
-def read_table(
+def read_numbers(
     source: Path | bytes,
     column_names: ColumnNames,
     dialect: Dialect,
     most: Most = Most(),  # noqa: B008
-) -> Table:
+) -> TableOfNumbers:
     """Return the columns of a table that mean something, in SI, from a file or its bytes.
 
     TextError tells all that is wrong: its ``faults`` are one for each line.
 
     >>> data = "Rig 7\\n\\nv0\\tmu_macro\\nmm/s\\t%\\n1,5\\t7\\n2,5\\t9\\n".encode()
-    >>> table = read_table(data, ColumnNames({"v0": "v0", "mu_macro": "mu0"}, [["v0"]]), Dialect())
+    >>> names = ColumnNames({"v0": "v0", "mu_macro": "mu0"}, [["v0"]])
+    >>> table = read_numbers(data, names, Dialect())
     >>> table.columns["mu_macro"].tolist(), table.skipped
     ([0.07, 0.09], [1])
     >>> table.read_as
@@ -449,7 +451,7 @@ def read_table(
         raise _wrong_rows(sorted(wrong, key=lambda one: one[0]), lines, dialect)
     units = {name: layout.units.unit(i) for name, (i, _) in columns.items()}
     skipped = sorted({*layout.skipped, *table.account.skipped})
-    return Table(si, as_written, units, lines, skipped, table.read_as)
+    return TableOfNumbers(si, as_written, units, lines, skipped, table.read_as)
 
 
 def _refuse_named_statistics(account: Account, lines: list[int], rows: list[list[str]]) -> None:

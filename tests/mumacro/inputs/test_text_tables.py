@@ -460,7 +460,7 @@ def test_what_is_no_row_among_the_rows_is_refused_with_those_before_it(
 
 def test_a_first_segment_with_a_longer_row_of_units_is_not_lost() -> None:
     text = f"v0,mu_macro\nmm/s,-,N\n{TWO}\nv0,mu_macro\n{TWO}"
-    assert "between the heads of lines 1 and 6: --skip 5" in str(refused(text))
+    assert "between the headers of lines 1 and 6: --skip 5" in str(refused(text))
     assert read(text, skip=5).lines == [7, 8]
 
 
