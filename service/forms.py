@@ -108,8 +108,8 @@ def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
                 reasons[i] = _first(error)
             continue
         k = one.columns["k"]
-        ends: Any = one.ends or ((k,), (k,))  # a number is an interval of itself
-        filled = {name: end[0] for name, end in zip(ENDS, ends, strict=True)} | one.columns
+        ends: Any = one.ends or (k, k)  # a number is an interval of itself
+        filled = {**dict(zip(ENDS, ends, strict=True)), **one.columns}
         filled |= {f"std_{name}": x for name, x in one.std.items() if name not in in_query}
         for name, column in of_kind.items():
             column.append(values.get(name, usual[name]))

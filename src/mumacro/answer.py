@@ -264,7 +264,7 @@ class Answer(Result, Generic[Number]):
         """Return the answer to one case with the digits of a picture, and the case."""
         cases, case = self.cases, dict[str, Any](self.cases.columns)
         if cases.ends is not None:
-            case["k"] = [float(end[0]) for end in cases.ends]
+            case["k"] = [*cases.ends]
         low, high = (getattr(self, name, None) for name in BAND)
         band = "" if low is None or high is None else f" ({low:.4g} to {high:.4g})"
         words = plotting.case_title(case, cases.kind.names)

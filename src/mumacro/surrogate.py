@@ -589,27 +589,36 @@ class Surrogate:
             if types <= _SIMPLE:  # there is nothing else to look for
                 fields = FIELDS if f is ABSENT else _SIX_WITH_F
                 of_six = Cases.of(dict(zip(fields, six, strict=True)), _SHORT[contact])
-                wanted = [*names_in(include), "gradient"] if gradient else names_in(include)
-                return self.answer(of_six, chosen(wanted, of_six))
+                if type(include) is tuple and not (include or gradient or of_six.std):
+                    return self.answer(of_six)
+                return self.answer(of_six, chosen(include, of_six, gradient))
         for name, value in unknown_names.items():
             raise no_such_input(name, value)
         arguments = locals()
-        keywords = {name: x for name in COLUMNS if (x := arguments[name]) is not ABSENT}
-        keywords |= {
-            name: x for name, usual in _OPTIONS.items() if (x := arguments[name]) is not usual
-        }
-        values = named(cases, keywords)
-        options = {name: values.pop(name, usual) for name, usual in _OPTIONS.items()}
-        if options["illegal"] not in ILLEGAL:
-            raise InputError("illegal", options["illegal"], '"nan" or "raise"')
-        strict = options["illegal"] == "raise"
-        names = names_in(options["include"])
-        if options["gradient"]:
-            names.append("gradient")
-        if has_labels(values.values()) or (cases is not None and frame_of_cases(cases)):
+        values = {name: x for name in COLUMNS if (x := arguments[name]) is not ABSENT}
+        types = {*map(type, values.values())}
+        are_words = type(contact) in _WORDS and type(direction) in _WORDS
+        if cases is None and types <= _SIMPLE and are_words:
+            is_labelled = False
+        else:
+            values |= {
+                name: x for name, usual in _OPTIONS.items() if (x := arguments[name]) is not usual
+            }
+            values = named(cases, values)
+            include, gradient, illegal = (values.pop(name, x) for name, x in _OPTIONS.items())
+            is_labelled = has_labels(values.values()) or bool(
+                cases is not None and frame_of_cases(cases)
+            )
+        if illegal not in ILLEGAL:
+            raise InputError("illegal", illegal, '"nan" or "raise"')
+        strict = illegal == "raise"
+        if is_labelled:
+            names = [*names_in(include), *["gradient"] * bool(gradient)]
             return evaluate_labelled(self, cases, values, names, strict)
-        cases = Cases.of(values, strict=strict)
-        return self.answer(cases, chosen(names, cases))
+        of_values = Cases.of(values, strict=strict)
+        if type(include) is tuple and not (include or gradient or of_values.std):
+            return self.answer(of_values)
+        return self.answer(of_values, chosen(include, of_values, gradient))
 
     def answer(
         self, cases: Cases, outputs: tuple[Output, ...] = (), groups: bool = False

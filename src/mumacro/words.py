@@ -89,7 +89,7 @@ def _rows_of(
         ("source", answer.source, "", f"of {surrogate.id}, tolerance {surrogate.tolerance:g}"),
     ]
     if cases.ends is not None:
-        low, high = (_stiffness(float(end[0]), shown, units) for end in cases.ends)
+        low, high = (_stiffness(float(end), shown, units) for end in cases.ends)
         middle = _stiffness(cases.columns["k"], shown, units)
         least, most = (number(x, error) for x in (answer.mu_macro_low, answer.mu_macro_high))
         meaning = f"for k from {low} to {high}; {rows[0][1]} at {middle}, the geometric middle"

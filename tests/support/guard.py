@@ -330,10 +330,13 @@ def _run(folder: Path, *words: str, checkout: Path | None = None) -> str:
     programs = f"{root}/.venv/bin{os.pathsep}{os.environ.get('PATH', os.defpath)}"
     environment = {name: x for name, x in os.environ.items() if not name.startswith("MUMACRO_")}
     environment |= {"PATH": programs, "PYTHONPATH": str(root), "MPLBACKEND": "agg"}
-    done = subprocess.run(
-        words, cwd=folder, env=environment, capture_output=True, text=True, errors="replace",
-        stdin=subprocess.DEVNULL, timeout=SECONDS, check=False,
-    )  # fmt: skip
+    try:
+        done = subprocess.run(
+            words, cwd=folder, env=environment, capture_output=True, text=True, errors="replace",
+            stdin=subprocess.DEVNULL, timeout=SECONDS, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return f"not ended after {SECONDS} s"
     text = f"exit code {done.returncode}\n{done.stdout}\n--- stderr\n{done.stderr}"
     return _without_ids(text.replace(str(folder), ".").replace(str(root), "CHECKOUT"))
 

@@ -98,9 +98,9 @@ def read(name: str, value: Any, quantity: str = "") -> Value:
         return Value(as_double(name, value))
     if of_type is Value:  # read before
         return value  # type: ignore[no-any-return]
-    quantity = quantity or quantity_of(name)
     if of_type is str:
         return _of_text(name, quantity, value)
+    quantity = quantity or quantity_of(name)
     if is_gap(value):
         raise InputError(name, None, STIFFNESS if name == "k" else A_NUMBER)
     if isinstance(value, str):
@@ -210,7 +210,7 @@ def _of_text(name: str, quantity: str, raw: str) -> Value:
     """Return a value as a person types it."""
     if len(raw) > LONGEST:
         raise InputError(name, f"{raw[:40]}…", "a number, with or without a unit")
-    text = tidy(raw)
+    text, quantity = tidy(raw), quantity or quantity_of(name)
     rigid = quantity in OR_RIGID
     if rigid and is_rigid(text):
         return Value(math.inf, text=raw)

@@ -32,6 +32,7 @@ from mumacro.inputs.fields import (
     DIRECTIONS,
     ENDS,
     FIELDS,
+    FIELDS_OF,
     LIFTS_OFF,
     POSITIVE,
     RAD_PER_CYCLE,
@@ -67,6 +68,8 @@ ALL_FIELDS = (*FIELDS[:4], AMPLITUDE, *FIELDS[4:])
 KIND = ("contact", "direction")
 #: columns of deviations -> the input
 DEVIATIONS = {f"std_{name}": name for name in (*ALL_FIELDS, "f")}
+# the same -> its field, and the value of one unit of the column there
+_DEVIATION_OF = {column: field_of(name) for column, name in DEVIATIONS.items()}
 #: what a data frame or a file may hold
 COLUMNS = (*ALL_FIELDS, "f", *ENDS, *KIND, *DEVIATIONS)
 #: what a mapping may hold, too: options of one call
@@ -86,8 +89,8 @@ class Cases(NamedTuple):
     columns: dict[str, float | Array]
     #: of the inputs, broadcast: () for one case alone
     shape: tuple[int, ...]
-    #: lowest and highest k of an interval, each (n,)
-    ends: tuple[Array, Array] | None = None
+    #: lowest and highest k of an interval, as ``columns``
+    ends: tuple[float | Array, float | Array] | None = None
     #: standard deviations of inputs, in their units, by name as in ``columns``; without an entry 0
     std: dict[str, float | Array] = {}  # noqa: RUF012 - never changed
     #: f [Hz] where it was given in place of omega: messages name what came in
@@ -113,21 +116,27 @@ class Cases(NamedTuple):
         ((2,), inf)
         """
         if kind is None:
-            kind = kind_of(*(values.get(name, word) for name, word in SPRING.names.items()))
-        _refuse_other_amplitude(values, kind)
-        columns, std, ends, units, f, gaps = _inputs(values, kind.fields)
+            kind = SPRING
+            if not values.keys().isdisjoint(KIND):
+                kind = kind_of(*(values.get(name, word) for name, word in SPRING.names.items()))
+        if kind.direction or AMPLITUDE in values:
+            _refuse_other_amplitude(values, kind)
+        fields = FIELDS_OF[kind.direction]
+        columns, std, ends, units, f, gaps = _inputs(values, fields)
         if not values.keys().isdisjoint(DEVIATIONS):
-            std |= _deviations(values, kind.fields, std, gaps)
+            std |= _deviations(values, fields, std, gaps)
         shape = _shape_of(columns, std)
         faults = _by_case(gaps, shape, strict) if gaps else {}
         if shape:
             columns = {name: _of_all(x, shape) for name, x in columns.items()}
             std = {name: _of_all(x, shape) for name, x in std.items()}
             f = None if f is None else _of_all(f, shape)
-        if ends is not None:
-            ends = _flat_ends(ends, shape, strict)
+            if ends is not None:
+                ends = _of_all(ends[0], shape), _of_all(ends[1], shape)
         cases = cls(kind, columns, shape, ends, std, f, units, faults)
         if strict or not shape:
+            if strict and ends is not None:
+                _check_ends(*ends, shape)
             check(columns, f, (cases.size,) if shape else ())
         return cases._with_legal_deviations(strict or not shape) if std else cases
 
@@ -156,7 +165,7 @@ class Cases(NamedTuple):
             columns={name: cut(x) for name, x in self.columns.items()},
             shape=(len(places),),
             faults=faults,
-            ends=self.ends and (self.ends[0][which], self.ends[1][which]),
+            ends=self.ends and (cut(self.ends[0]), cut(self.ends[1])),
             std={name: cut(x) for name, x in self.std.items()},
             f=cut(self.f),
         )
@@ -167,18 +176,18 @@ class Cases(NamedTuple):
             if fault := faults.get(index):
                 return InputError(name, fault.entry, fault.reason.removeprefix("must be "))
 
-        def at(x: Any) -> float:
+        def pick(x: Any) -> float:
             return float(x[index] if isinstance(x, np.ndarray) else x)
 
-        k = at(self.columns["k"])
+        k = pick(self.columns["k"])
         try:
             if self.ends is not None and math.isnan(k):
-                raise no_interval(at(self.ends[0]), at(self.ends[1]))
+                raise no_interval(pick(self.ends[0]), pick(self.ends[1]))
             for name, deviation in self.std.items():
-                if not 0.0 <= at(deviation) < math.inf:
-                    raise InputError(f"std_{name}", at(deviation), EXACT)
-            f = None if self.f is None else at(self.f)
-            check({name: at(x) for name, x in self.columns.items()}, f)
+                if not 0.0 <= pick(deviation) < math.inf:
+                    raise InputError(f"std_{name}", pick(deviation), EXACT)
+            f = None if self.f is None else pick(self.f)
+            check({name: pick(x) for name, x in self.columns.items()}, f)
         except InputError as error:
             return error
         raise AssertionError(f"the case {self.columns} has an answer")
@@ -186,6 +195,8 @@ class Cases(NamedTuple):
     def _with_legal_deviations(self, refuse: bool) -> "Cases":
         """Return the same with NaN in v0 where a deviation is illegal, so that the case has no
         answer; where ``refuse``, raise InputError for the first one."""
+        if not self.shape and all(0.0 <= float(x) < math.inf for x in self.std.values()):
+            return self
         bad = np.zeros(self.size if self.shape else 1, np.bool_)
         for deviation in self.std.values():
             bad |= ~((np.asarray(deviation) >= 0.0) & (np.asarray(deviation) < math.inf))
@@ -409,12 +420,13 @@ def ends_in(values: Mapping[str, Any], gaps: "_Gaps | None" = None) -> tuple[Any
         if end.std is not None:
             raise InputError(name, values[name], AN_END)
     low, high = (end.si for end in of_ends)
-    try:
-        legal = is_interval(low, high)
-    except ValueError as error:
-        shapes = np.shape(low), np.shape(high)
-        raise InputError("k_low", shapes, "of a shape that broadcasts with k_high") from error
-    if not np.ndim(legal) and not legal:
+    if isinstance(low, np.ndarray) or isinstance(high, np.ndarray):
+        try:
+            np.broadcast_shapes(np.shape(low), np.shape(high))
+        except ValueError as error:
+            shapes = np.shape(low), np.shape(high)
+            raise InputError("k_low", shapes, "of a shape that broadcasts with k_high") from error
+    elif not 0.0 < low <= high < math.inf:
         raise no_interval(float(low), float(high))
     return low, high
 
@@ -433,7 +445,9 @@ def is_interval(low: Any, high: Any) -> Any:
 
 
 def middle(low: Any, high: Any) -> float | Array:
-    """Return the geometric middle of intervals, NaN where one is none."""
+    """Return the geometric middle of intervals, NaN where the ends are not ordered."""
+    if type(low) is float is type(high):
+        return min(max(math.sqrt(low) * math.sqrt(high), low), high)
     legal = is_interval(low, high)
     lower, upper = (np.where(legal, end, math.nan) for end in (low, high))
     inside = np.clip(np.sqrt(lower) * np.sqrt(upper), lower, upper)
@@ -451,8 +465,8 @@ def without_interval(
     inputs = {name: value for name, value in case.items() if value is not None or name == "k"}
     ends = ends_in(inputs)
     if ends is None and isinstance(inputs.get("k"), str):
-        reading = read("k", inputs["k"])
-        ends = None if reading.low is None else (reading.low, reading.high)
+        k = read("k", inputs["k"])
+        ends = None if k.low is None else (k.low, k.high)
     if ends is None:
         return case, {}
     if along == "k":
@@ -502,7 +516,9 @@ class _Inputs(NamedTuple):
 
 def _understood(name: str, value: Any, gaps: _Gaps) -> Value:
     """Return one value, or the numbers of a column, whose gaps go into ``gaps``."""
-    if not is_column(value):
+    if type(value) is float:
+        return Value(value)
+    if type(value) is str or not is_column(value):
         return read(name, value)
     column = read_column(name, value)
     if column.faults:
@@ -558,7 +574,7 @@ def _inputs(values: Mapping[str, Any], fields: tuple[str, ...]) -> _Inputs:
                 ends = one.low, one.high
         if source == "f":
             f = value
-            value = _angular(value)
+            value = RAD_PER_CYCLE * value if type(value) is float else _angular(value)
         columns[name] = value
     return _Inputs(columns, std, ends, units, f, gaps)
 
@@ -571,17 +587,19 @@ def _deviations(
     std: _Numbers = {}
     for column in [column for column in DEVIATIONS if column in values]:
         name = DEVIATIONS[column]
-        value, (field, per) = values[column], field_of(name)
+        value, (field, per) = values[column], _DEVIATION_OF[column]
         if field not in fields:
             bound = f"left out: this direction has no {name}"
             raise InputError(column, value, bound)
         if field in std or field in within:
             bound = f"left out beside that of {field}: give the deviation once"
             raise InputError(column, value, bound)
-        deviation = _understood(column, value, gaps)
-        if deviation.std is not None or deviation.low is not None:
-            raise InputError(column, value, A_DEVIATION)
-        std[field] = per * deviation.si
+        if type(value) is not float:
+            deviation = _understood(column, value, gaps)
+            if deviation.std is not None or deviation.low is not None:
+                raise InputError(column, value, A_DEVIATION)
+            value = deviation.si
+        std[field] = per * value
     return std
 
 
@@ -602,29 +620,29 @@ def other_amplitude(name: str, value: Any, kind: Kind) -> InputError:
     return InputError(name, value, bound)
 
 
-def _flat_ends(ends: tuple[Any, Any], shape: tuple[int, ...], strict: bool) -> tuple[Array, Array]:
-    """Return both ends of the interval of every case, (n,); InputError for the first that is none,
-    where ``strict``."""
-    low, high = (flat(np.asarray(end), shape or (1,)) for end in ends)
-    if strict:
-        for index in np.flatnonzero(~is_interval(low, high) & ~np.isinf(low)).tolist():
-            where = index if shape else None
-            raise no_interval(float(low[index]), float(high[index]), where)
-    return low, high
+def _check_ends(low: float | Array, high: float | Array, shape: tuple[int, ...]) -> None:
+    """Refuse the first interval of the cases whose ends are not ordered."""
+    ends = [np.broadcast_to(end, math.prod(shape)) for end in (low, high)]
+    for index in np.flatnonzero(~is_interval(*ends) & ~np.isinf(ends[0])).tolist():
+        raise no_interval(float(ends[0][index]), float(ends[1][index]), index if shape else None)
 
 
 def _of_all(x: float | Array, shape: tuple[int, ...]) -> float | Array:
     """Return a column as one number, or flat with one for each case."""
     if not isinstance(x, np.ndarray):
         return x
-    return flat(x, shape) if x.size != 1 else x.item()
+    if x.size == 1:
+        return x.item()
+    return x if x.shape == shape and x.ndim == 1 and x.flags.carray else flat(x, shape)
 
 
 def _shape_of(columns: _Numbers, std: _Numbers) -> tuple[int, ...]:
     """Return the shape to which all columns broadcast; InputError where they do not."""
     arrays = [x for x in (*columns.values(), *std.values()) if isinstance(x, np.ndarray)]
+    if len(arrays) < 2:
+        return arrays[0].shape if arrays else ()
     try:
-        return common_shape(arrays) if arrays else ()
+        return common_shape(arrays)
     except ValueError as error:
         shapes = {name: np.shape(x) for name, x in (columns | std).items() if np.ndim(x)}
         raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error

@@ -227,8 +227,8 @@ SPRINGS_OF: dict[str, Springs] = {
 }
 AMPLITUDE = "Fz_amplitude"  # of the normal force [N], in place of y0
 AMPLITUDES = ("y0", AMPLITUDE)
-# by code of the direction
-_FIELDS = (
+#: the six inputs by code of the direction
+FIELDS_OF = (
     FIELDS,
     FIELDS,
     tuple(AMPLITUDE if name == "y0" else name for name in FIELDS),
@@ -260,7 +260,7 @@ class Kind(NamedTuple):
     def fields(self) -> tuple[str, ...]:
         """The six inputs by name, :data:`mumacro.inputs.fields.FIELDS` with Fz_amplitude in place
         of y0 for normal."""
-        return _FIELDS[self.direction]
+        return FIELDS_OF[self.direction]
 
     @property
     def names(self) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """The standard deviation of mu_macro from independent deviations of the inputs, to first order; and
 where first order is not enough."""
 
+import math
 from functools import reduce
-from typing import Any
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from mumacro.inputs.fields import POSITIVE
 from mumacro.notes import REMARK, Note
 from mumacro.outputs.entry import Member, Output, Values
 from mumacro.outputs.evaluated import Evaluated, where
-from mumacro.outputs.gradient import slopes_by_input
 
 #: how far, in whole deviations, mu_macro one deviation up or down may be from the straight line
 STRAIGHT = 0.2
@@ -27,7 +26,7 @@ def std(cases: Evaluated) -> Values:
     }
     terms, doubts = (
         [where(exact[name], 0.0, of_inputs[name] * spread) for name, spread in spreads.items()]
-        for of_inputs in slopes_by_input(cases)
+        for of_inputs in (cases.gradient, cases.gradient_bound)
     )
     with np.errstate(all="ignore"):
         total, doubt = (reduce(np.hypot, parts) for parts in (terms, doubts))
@@ -41,20 +40,17 @@ def bent(cases: Evaluated, total: float) -> list[Note]:
     """Return remarks on one case: the inputs along which first order is not enough, since
     mu_macro one deviation up or down differs from the slope's by more than a fifth of the whole
     deviation."""
-    spreads = {name: x for name, x in cases.cases.std.items() if x and cases.columns[name] < np.inf}
-    if not spreads:
-        return []
-    moved: dict[str, Any] = {
-        name: np.full(2 * len(spreads), x) for name, x in cases.columns.items()
-    }
-    for i, (name, spread) in enumerate(spreads.items()):
-        moved[name][2 * i : 2 * i + 2] += spread, -spread
-    many = np.asarray(cases.beside(moved, 2 * len(spreads)).mu_macro)
-    mu = many.reshape(-1, 2) - cases.mu_macro
     remarks: list[Note] = []
-    for (name, spread), (up, down) in zip(spreads.items(), mu.tolist(), strict=True):
+    for name, spread in cases.cases.std.items():
+        value = cases.columns[name]
+        if not spread or value == math.inf:
+            continue
+        up, down = (
+            cases.replace(**{name: value + step}).mu_macro - cases.mu_macro
+            for step in (spread, -spread)
+        )
         straight = cases.gradient[name] * spread
-        if np.isnan(down):
+        if math.isnan(down):
             least = "> 0" if name in POSITIVE else ">= 0"
             text = f"{name} less its deviation is not {least}: its distribution is not symmetric"
         elif max(abs(up - straight), abs(down + straight)) > STRAIGHT * total:

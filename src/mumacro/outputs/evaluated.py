@@ -33,11 +33,11 @@ class Evaluated:
 
     def __init__(self, tabulated: Tabulated, cases: Cases, detail: Detail = "values") -> None:
         self.tabulated, self.cases, self.kind = tabulated, cases, cases.kind
-        self.columns, self.words = cases.columns, self.kind.names
+        self.columns = cases.columns
         one = not cases.shape
         detail = "groups" if one and detail == "values" else detail
         self._take: Callable[[Any], Any] = _item if one else np.ravel
-        if one and not self.kind.direction and cases.ends is None:
+        if one and not self.kind.direction:
             self._take = float
             row = tabulated.one([*self.columns.values()], detail == "gradient", self.kind.contact)
         else:
@@ -60,10 +60,11 @@ class Evaluated:
     def _over_interval(self) -> None:
         """Compute the extremes of mu_macro, and the largest bound that was met there."""
         low, high, bound = self.tabulated.extremes(self.cases)
+        take = np.ravel if self.cases.shape else _item
         # of an interval of one point, rigid contact among them, there may be none
-        self.mu_macro_low = self._take(np.fmin(self.mu_macro, low))
-        self.mu_macro_high = self._take(np.fmax(self.mu_macro, high))
-        self.error_bound = self._take(np.fmax(self.error_bound, bound))
+        self.mu_macro_low = take(np.fmin(self.mu_macro, low))
+        self.mu_macro_high = take(np.fmax(self.mu_macro, high))
+        self.error_bound = take(np.fmax(self.error_bound, bound))
 
     @cached_property
     def moving(self) -> Any:
@@ -96,11 +97,6 @@ class Evaluated:
     def replace(self, **columns: Any) -> "Evaluated":
         """Return the answers to the same cases with other values of some inputs, and one k."""
         cases = self.cases._replace(columns={**self.columns, **columns}, ends=None)
-        return Evaluated(self.tabulated, cases)
-
-    def beside(self, columns: dict[str, Any], size: int) -> "Evaluated":
-        """Return the answers to other cases of this kind, in columns (size,)."""
-        cases = self.cases._replace(columns=columns, shape=(size,), ends=None)
         return Evaluated(self.tabulated, cases)
 
 

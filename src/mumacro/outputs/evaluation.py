@@ -25,6 +25,9 @@ _BALL_ALONG = 5.0  # a further factor: a ball along is a sum over springs
 _INTERVAL = 200.0
 
 
+_NO_NAMES = frozenset[str]()
+
+
 def names_in(include: Iterable[str] | str) -> list[str]:
     """Return the names of outputs in a list, or in a text with commas; InputError for an unknown
     one."""
@@ -43,13 +46,18 @@ def _unknown(name: Any) -> InputError:
     return InputError("include", name, f"one or more of {', '.join(OUTPUTS)}")
 
 
-def chosen(include: Iterable[str] | str, cases: Cases) -> tuple[Output, ...]:
-    """Return the outputs of these names, each once, in their order; with those of deviations where
-    the cases have some.
+def chosen(
+    include: Iterable[str] | str, cases: Cases, gradient: bool = False
+) -> tuple[Output, ...]:
+    """Return the outputs of these names, and ``gradient``, each once, in their order; with those of
+    deviations where the cases have some.
 
     InputError for an unknown name, one that the cases lack, and std without a deviation.
     """
-    names = frozenset(names_in(include)) if include else frozenset[str]()
+    is_empty = type(include) is tuple and not include
+    names = _NO_NAMES if is_empty else frozenset(names_in(include))
+    if gradient:
+        names |= {"gradient"}
     if not names and not cases.std:
         return ()
     return _chosen(names, cases.kind, bool(cases.std), cases.ends is not None)
@@ -131,7 +139,9 @@ def _of_one(case: Evaluated, outputs: tuple[Output, ...]) -> Answer[float]:
         (case.v_tilde, case.y_tilde, case.length_scale),
         cases,
     )
-    answer.outputs = {path: float(values[path]) for path in paths_of(outputs, cases.fields)}
+    if outputs:
+        paths = paths_of(outputs, cases.kind.fields)
+        answer.outputs = {path: float(values[path]) for path in paths}
     if cases.ends is not None:
         for name in BAND:
             setattr(answer, name, getattr(case, name))

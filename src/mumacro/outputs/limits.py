@@ -2,6 +2,7 @@
 
 import math
 
+from mumacro.inputs.fields import DIRECTIONS
 from mumacro.outputs.entry import Member, Output, Values
 from mumacro.outputs.evaluated import Evaluated, where
 
@@ -10,7 +11,7 @@ def limits(cases: Evaluated) -> Values:
     """Return mu_macro at rest; the speed at the border of continuous sliding, and mu_macro
     there."""
     omega = cases.columns["omega"]
-    if cases.words["direction"] == "along":  # where the contact begins to slide backwards
+    if DIRECTIONS[cases.kind.direction] == "along":  # where the contact begins to slide backwards
         speed = cases.columns["y0"] * omega
     else:  # rigid contact is the limit y~ -> inf: l0 omega v~crit = 0.477 omega sqrt(y0 l0) -> 0
         crit = cases.crit(where(cases.usable, cases.y_tilde, 0.0))

@@ -132,7 +132,8 @@ class Tabulated:
             raise TypeError("the cases have one k each")
         low, high = cases.ends
         six, kind = [*{**cases.columns, "k": low}.values()], cases.kind
-        return slices.intervals(self.data(kind=kind), six, high, self.threads, kind)
+        of_all = high if isinstance(high, np.ndarray) else np.full(cases.size, high)
+        return slices.intervals(self.data(kind=kind), six, of_all, self.threads, kind)
 
 
 def _check_border(pieces: Sequence[BorderPiece], path: Path) -> None:
