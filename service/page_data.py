@@ -13,7 +13,15 @@ import numpy as np
 from mumacro import plotting
 from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.errors import InputError
-from mumacro.inputs.fields import AMPLITUDE, CONTACTS, DIRECTIONS, INPUTS, LIKE, SPRINGS_OF, kind_of
+from mumacro.inputs.fields import (
+    AMPLITUDE,
+    CONTACTS,
+    DIRECTIONS,
+    INPUTS,
+    MEASURED_AS,
+    SPRINGS_OF,
+    kind_of,
+)
 from mumacro.inputs.units import UNITS_OF, Scale
 from mumacro.outputs import OUTPUTS
 from mumacro.stiffness import MATERIALS, SOURCE_OF_MATERIALS
@@ -91,7 +99,7 @@ def names(built: bool) -> dict[str, Any]:
             "range": exponents,
             "usual": INPUTS[name].usual,
             "note": note,
-            "units": _scales(UNITS_OF[LIKE.get(name, name)]),
+            "units": _scales(UNITS_OF[MEASURED_AS.get(name, name)]),
         }
         for name, (label, offered, exponents, _, note) in _INPUTS.items()
     }

@@ -26,7 +26,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.inputs.case import no_number
-from mumacro.inputs.fields import AMPLITUDE, BOUNDS, ENDS, LIKE, RIGID, STIFFNESS, refusal
+from mumacro.inputs.fields import AMPLITUDE, BOUNDS, ENDS, MEASURED_AS, RIGID, STIFFNESS, refusal
 from mumacro.inputs.fields import NAMES as INPUTS
 from mumacro.inputs.names import unknown_name
 from mumacro.motions.motion import PARTS
@@ -197,7 +197,7 @@ _LARGE = 1e308
 def names_of(model: type[BaseModel]) -> tuple[str, ...]:
     """Return what a model may be given: inputs first, options after them."""
     fields = model.model_fields
-    inputs = [name for name in (*INPUTS, *LIKE) if name in fields]
+    inputs = [name for name in (*INPUTS, *MEASURED_AS) if name in fields]
     return tuple(dict.fromkeys([*inputs, *fields]))
 
 

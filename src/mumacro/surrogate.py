@@ -186,7 +186,7 @@ class Surrogate:
 
     def regimes_on_map(self, kind: Kind) -> list[str]:
         """Return the regimes at ``plotting.AREAS`` of the map of a kind of contact."""
-        v, y = zip(*(plotting.place(*at, kind.normal) for at in plotting.AREAS), strict=True)
+        v, y = zip(*(plotting.place(*area, kind.normal) for area in plotting.AREAS), strict=True)
         swing = {"Fz_amplitude" if kind.normal else "y0": np.array(y)}
         # v~ = v0 and y~ = y0
         cases = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": np.array(v), **swing}

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mumacro.answer import Answer
-from mumacro.inputs.fields import LIKE, PER_UNIT, Kind
+from mumacro.inputs.fields import MEASURED_AS, PER_UNIT, Kind
 from mumacro.inputs.units import Unit, suit_unit
 from mumacro.notes import Note
 from mumacro.outputs import MEMBERS
@@ -101,7 +101,7 @@ def _rows_of(
         meaning = f"standard deviation; {parts}" if parts else "standard deviation"
         rows[0] = ("mu_macro", f"{rows[0][1]} ± {deviation}", "[-]", meaning)
     for name, slope in (answer.gradient or {}).items():
-        per = PER_UNIT[LIKE.get(name, name)]
+        per = PER_UNIT[MEASURED_AS.get(name, name)]
         error = answer.gradient_bound[name]
         rows.append((f"slope {name}", number(slope, error), f"[{per}]", f"d mu_macro / d {name}"))
     for path, value in answer.outputs.items():

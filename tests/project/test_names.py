@@ -261,16 +261,24 @@ def test_no_two_modules_of_the_library_have_one_name() -> None:
 
 #: words that do not say what a value is, and one that had three meanings
 BANNED = {"at", "both", "given", "like", "more", "others", "own", "reading", "strange"}
+INPUTS = (
+    *("carried", "case", "cases", "columns", "decoding", "doubts", "fields", "names", "numbers"),
+    "units",
+)
 #: the folders and files whose names are nouns
 CLEAN = (
     "builder",
     "src/mumacro/contacts",
     "src/mumacro/errors.py",
     "src/mumacro/fits",
+    "src/mumacro/frames.py",
+    *(f"src/mumacro/inputs/{name}.py" for name in INPUTS),
     "src/mumacro/kernel",
     "src/mumacro/motions",
     "src/mumacro/outputs",
     "src/mumacro/questions",
+    "src/mumacro/results.py",
+    "src/mumacro/surrogate.py",
     "src/mumacro/table",
 )
 

@@ -18,7 +18,17 @@ from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, other_amplitude
 from mumacro.inputs.cells import in_si, numbers_of
-from mumacro.inputs.fields import AMPLITUDE, ENDS, GAP, LIKE, SI, SPRING, Kind, kind_of, refusal
+from mumacro.inputs.fields import (
+    AMPLITUDE,
+    ENDS,
+    GAP,
+    MEASURED_AS,
+    SI,
+    SPRING,
+    Kind,
+    kind_of,
+    refusal,
+)
 from mumacro.inputs.names import absent, find_heads, meant_by
 from mumacro.inputs.numbers import Signs
 from mumacro.inputs.units import Scale, scale_of, split_unit
@@ -153,8 +163,8 @@ def find_columns(
     >>> find_columns(["mu0", "Fz [kN]", "k", "y0", "f", "v0", "note"]).headings["Fz"]
     ('Fz [kN]', Scale(times=1000.0, over=1.0))
     """
-    like = {name: LIKE.get(name, name) for name in (*ALL_FIELDS, "f", *ENDS)}
-    like |= {column: LIKE.get(name, name) for column, name in DEVIATIONS.items()}
+    like = {name: MEASURED_AS.get(name, name) for name in (*ALL_FIELDS, "f", *ENDS)}
+    like |= {column: MEASURED_AS.get(name, name) for column, name in DEVIATIONS.items()}
     units = units or {}
     heads, faults = find_heads([_with_unit(name, units.get(name)) for name in names], like)
     for name, (i, scale) in heads.items():
@@ -236,8 +246,8 @@ def kind_of_batch(batch: pa.RecordBatch, kind: Kind, where: str = "") -> Kind:
 
 def names_of_columns(rigid: bool = False) -> ColumnNames:
     """Return the columns that a table of cases may have, and those that it needs."""
-    names = [*SI, *LIKE]
-    like = {name: LIKE.get(name, name) for name in names}
+    names = [*SI, *MEASURED_AS]
+    like = {name: MEASURED_AS.get(name, name) for name in names}
     like |= {f"std_{name}": unit for name, unit in like.items()}
     stiffness = [] if rigid else [("k", ENDS[0])]
     groups = [("mu0",), ("Fz",), *stiffness, ("y0", AMPLITUDE), ("omega", "f"), ("v0",)]
@@ -327,7 +337,7 @@ def numbers(
     ):
         field = name.removeprefix("std_")
         cells = pc.cast(array, pa.string()).to_pylist()
-        numbers, faults = numbers_of(cells, LIKE.get(field, field), signs, scale)
+        numbers, faults = numbers_of(cells, MEASURED_AS.get(field, field), signs, scale)
         si, too_large = in_si(numbers, scale)
         return numbers, si, faults | too_large
     is_number = (

@@ -12,7 +12,7 @@ from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.cases import check, columns_of, library_of, no_such_input, select
 from mumacro.inputs.columns import to_si
 from mumacro.inputs.doubts import UNITS, remarks
-from mumacro.inputs.fields import AMPLITUDE, LIKE, NAMES, kind_of
+from mumacro.inputs.fields import AMPLITUDE, MEASURED_AS, NAMES, kind_of
 from mumacro.inputs.layout import Dialect
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.text_tables import Most, TableOfNumbers, read_numbers
@@ -33,7 +33,7 @@ _LEAST, _MOST = 1e-20, 1e20  # friction and std, whose squares and their product
 
 
 #: columns of a table of points, and the input whose units each has
-COLUMNS = {name: LIKE.get(name, name) for name in (*NAMES, AMPLITUDE)}
+COLUMNS = {name: MEASURED_AS.get(name, name) for name in (*NAMES, AMPLITUDE)}
 COLUMNS |= {"mu_macro": "mu0", STD: "mu0", FORCE: "Fz"}
 _COLUMN_NAMES = ColumnNames(COLUMNS, (("v0",), ("mu_macro", FORCE)))
 

@@ -660,8 +660,8 @@ def _missing(values: Mapping[str, Any], fields: tuple[str, ...]) -> InputError:
         "omega": "given, or f [Hz] in its place",
         AMPLITUDE: "given [N] for direction normal",
     }
-    others = ", ".join(in_words[name] for name in absent[1:])
-    return InputError(absent[0], None, bounds[absent[0]] + (others and f"; so must {others}"))
+    rest = ", ".join(in_words[name] for name in absent[1:])
+    return InputError(absent[0], None, bounds[absent[0]] + (rest and f"; so must {rest}"))
 
 
 @np.errstate(over="ignore")  # takes less time than a with statement within

@@ -85,7 +85,7 @@ def encoding_of(name: str) -> str:
 
 
 def file_pieces(
-    path: Path, report_place: Callable[[int], None] = lambda _at: None
+    path: Path, report_place: Callable[[int], None] = lambda _place: None
 ) -> Iterator[bytes]:
     """Yield the bytes of a file in pieces, also of a compressed one (.gz); ``report_place`` is told
     how far the file is read. TextError where a compressed one is damaged."""

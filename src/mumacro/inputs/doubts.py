@@ -86,8 +86,8 @@ def remarks(
                 continue
             has_reason |= new
             first = int(np.flatnonzero(new)[0])
-            at = {name: float(column.flat[first]) for name, column in six.items()}
-            name, text = _sentence(field, at, frequency, typed, names or {})
+            case = {name: float(column.flat[first]) for name, column in six.items()}
+            name, text = _sentence(field, case, frequency, typed, names or {})
             cases = int(np.count_nonzero(new))
             if name in by_field:
                 earlier = by_field[name]

@@ -103,7 +103,7 @@ INPUTS = {row.name: row for row in _ROWS}
 SI = {row.name: (row.unit, row.words) for row in _ROWS if row.in_place_of in ("", "omega")}
 #: inputs in place of another one -> the input whose unit they have: the amplitude of the normal
 #: force, the ends of k
-LIKE = {"Fz_amplitude": "Fz", "k_low": "k", "k_high": "k"}
+MEASURED_AS = {"Fz_amplitude": "Fz", "k_low": "k", "k_high": "k"}
 NAMES = tuple(SI)
 FIELDS = tuple(name for name in NAMES if name != "f")
 UNITS = {name: SI[name][0] for name in FIELDS}

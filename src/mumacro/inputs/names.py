@@ -136,29 +136,29 @@ _LISTED, _COMPARED = 20, 100
 _WITH_UNIT = re.compile(r"(\w+)(?: ?/ ?| in |, ?)(\S.*)")
 
 
-def heading(cell: str, like: Mapping[str, str]) -> str:
+def heading(cell: str, input_of: Mapping[str, str]) -> str:
     """Return a head as it stands in a table, on one line, with its unit in brackets if it names one
-    of ``like``.
+    of ``input_of``.
 
     >>> heading("v0 / (mm/s)", {"v0": "v0"}), heading("run / day", {"v0": "v0"})
     ('v0 [mm/s]', 'run / day')
     """
     text = " ".join(cell.split()) if "\n" in cell else cell.strip()
     match = _WITH_UNIT.fullmatch(text)
-    if match and match[1] in like and text not in like:
+    if match and match[1] in input_of and text not in input_of:
         unit = match[2].strip(" ()[]")
-        if scale_of(like[match[1]], unit) is not None:
+        if scale_of(input_of[match[1]], unit) is not None:
             return f"{match[1]} [{unit}]"
     return text
 
 
 def find_heads(
-    heads: Sequence[str], like: Mapping[str, str]
+    heads: Sequence[str], input_of: Mapping[str, str]
 ) -> tuple[dict[str, tuple[int, Scale]], list[str]]:
     """Return the place and unit of each column by name, and the faults of the heads.
 
-    ``like`` has the names of the columns, and for each the input whose units it has; other columns
-    are left out.
+    ``input_of`` has the names of the columns, and for each the input whose units it has; other
+    columns are left out.
 
     >>> find_heads(["v0 [mm/s]", "note"], {"v0": "v0"})
     ({'v0': (0, Scale(times=1.0, over=1000.0))}, [])
@@ -167,11 +167,12 @@ def find_heads(
     faults = []
     for i, head in enumerate(heads):
         name, unit = split_unit(head)
-        if name not in like:
+        if name not in input_of:
             continue
-        scale = Scale() if unit is None else scale_of(like[name], unit)
+        scale = Scale() if unit is None else scale_of(input_of[name], unit)
         if scale is None:
-            faults.append(f"the column {head!r} has a unit that {_no_unit(name, unit or '', like)}")
+            reason = _why_no_unit(name, unit or "", input_of[name])
+            faults.append(f"the column {head!r} has a unit that {reason}")
         if name in columns:
             faults.append(
                 f"{name} is there twice: {heads[columns[name][0]]!r} and {head!r}; rename one"
@@ -182,14 +183,14 @@ def find_heads(
     return columns, faults
 
 
-def _no_unit(name: str, unit: str, like: Mapping[str, str]) -> str:
+def _why_no_unit(name: str, unit: str, input_name: str) -> str:
     """Return why a unit of a column is refused, with the number to give where it is clear what is
     meant.
 
-    >>> _no_unit("y0", "um pp", {"y0": "y0"})
+    >>> _why_no_unit("y0", "um pp", "y0")
     'y0 cannot have: it must be half of peak to peak: give 0.5um in place of 1 um pp'
     """
-    quantity = QUANTITY_OF[like[name]]
+    quantity = QUANTITY_OF[input_name]
     if name == "omega" and scale_of("f", unit):
         return f"{name} cannot have: a frequency is f [Hz]; give {QUANTITIES[quantity].such_as}"
     bound = explain_unit(quantity, 1.0, unit)
@@ -232,15 +233,15 @@ def _listed(heads: Sequence[str]) -> str:
     text = ", ".join(
         repr(head if len(head) <= 80 else f"{head[:77]}...") for head in heads[:_LISTED]
     )
-    more = len(heads) - _LISTED
-    return f"{text} and {more:,} more" if more > 0 else text
+    rest = len(heads) - _LISTED
+    return f"{text} and {rest:,} more" if rest > 0 else text
 
 
 def _heading(name: str) -> str:
     """Return the heading that a column of an input has, in SI units."""
     heading = f"{name} [{unit_of(name)}]"
-    more = {"omega": " or f [Hz]", "mu_macro": " (the mean friction force over Fz)"}
-    return heading + more.get(name, "")
+    addition = {"omega": " or f [Hz]", "mu_macro": " (the mean friction force over Fz)"}
+    return heading + addition.get(name, "")
 
 
 def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:

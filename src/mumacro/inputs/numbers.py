@@ -188,9 +188,9 @@ def split_number(text: str) -> tuple[float, str]:
     if match is None:
         raise ValueError("must be a number")
     end = match.end()
-    more = _POWER.match(text, end) or _RAISED.match(text, end)
-    if more is not None:
-        end = more.end()
+    power = _POWER.match(text, end) or _RAISED.match(text, end)
+    if power is not None:
+        end = power.end()
     return read_number(text[:end]), text[end:].strip()
 
 
@@ -313,7 +313,7 @@ class Signs:
             f"them alike, or give {self._dashes}decimal"
         )
 
-    def _ambiguity(self, cell: Cell, *_others: Cell) -> TextError:
+    def _ambiguity(self, cell: Cell, *_rest: Cell) -> TextError:
         sign, _ = evidence(cell.text)
         other = "," if sign == "." else "."
         match = _NUMERAL.search(cell.text)
