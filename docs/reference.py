@@ -1,7 +1,7 @@
 """Write the pages that the program describes itself: commands, fields of HTTP, Python, scripts.
 
-    python docs/reference.py            # writes docs/command-help.md, http-fields.md, python.md and
-                                        # the lists of scripts in decisions.md
+    python docs/reference.py            # writes docs/http-fields.md and python.md, the help in
+                                        # command-line.md and the lists of scripts in decisions.md
     python docs/reference.py --check    # names those that are not what they would be now
 
 They are text, so that they read alike on the site and in the repository; a test compares them with
@@ -112,11 +112,11 @@ def help_of(command: str) -> str:
     return text.getvalue().strip()
 
 
-def command_page() -> str:
-    """Return the page with the help of every command."""
-    introduction = f"{MADE} [Command line](command-line.md) explains the commands."
-    helps = [f"## `{one} --help`\n\n```text\n{help_of(one)}\n```" for one in COMMANDS]
-    return "\n\n".join(["# The help of every command", introduction, *helps]) + "\n"
+def with_help(page: str) -> str:
+    """Return a page with the help of every command between its markers made anew."""
+    helps = [f"### `{one} --help`\n\n```text\n{help_of(one)}\n```" for one in COMMANDS]
+    text = "\n\n".join(["<!-- begin help -->", *helps, "<!-- end help -->"])
+    return re.sub(r"<!-- begin help -->.*?<!-- end help -->", lambda _: text, page, flags=re.DOTALL)
 
 
 # --- scripts --------------------------------------------------------------------------------------
@@ -432,7 +432,7 @@ def python_page() -> str:
 def pages() -> dict[str, str]:
     """Return every page that is made here, by its path under docs."""
     return {
-        "command-help.md": command_page(),
+        "command-line.md": with_help((DOCS / "command-line.md").read_text("utf-8")),
         "http-fields.md": http_page(),
         "python.md": python_page(),
         "decisions.md": with_scripts((DOCS / "decisions.md").read_text("utf-8")),

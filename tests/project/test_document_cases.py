@@ -82,8 +82,9 @@ def test_no_motion_of_the_documents_is_larger_than_what_is_usual() -> None:
     """A motion has no remarks of its own; its amplitudes are those of y0."""
     least, most = INPUTS["y0"].usual
     option = re.compile(r"--[xy] (\S+)")
-    pages = [page for page in PAGES if page.stem != "command-help"]  # names of arguments
-    lines = [line for page in pages for line in page.read_text("utf-8").splitlines()]
+    helps = re.compile(r"<!-- begin help -->.*?<!-- end help -->", re.DOTALL)  # names of arguments
+    texts = [helps.sub("", page.read_text("utf-8")) for page in PAGES]
+    lines = [line for text in texts for line in text.splitlines()]
     texts = [text for line in lines if "mumacro " in line for text in option.findall(line)]
     amplitudes = [one[1] for text in texts for one in read_oscillation("x", text.strip("`"))]
     assert len(amplitudes) > 3

@@ -139,7 +139,7 @@ def test_the_ball_beside_one_spring_is_as_the_page_on_validity_says(surrogate: S
 
 
 def test_the_folds_along_k_are_those_on_the_page(surrogate: Surrogate) -> None:
-    page = (DOCS / "how-to" / "target.md").read_text("utf-8")
+    page = (DOCS / "how-to" / "law.md").read_text("utf-8")
     pattern = r"above ([\d.]+) it has a minimum \(\$\\tilde\{y\}\$ from ([\d.]+) to ([\d.]+)\)"
     born, first, last = map(float, re.findall(pattern, page)[0])
     y = np.geomspace(2.0, 20.0, 4001)

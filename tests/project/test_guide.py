@@ -132,7 +132,7 @@ ELSEWHERE = {
 PROGRAMS_ELSEWHERE = {"docs/how-to/many-cases.md": "tests/project/test_recipes.py"}
 #: made by the program: tests/project/test_documents.py makes them, and
 #: tests/project/test_docstrings.py runs the examples of docstrings
-REFERENCE = {ROOT / "docs" / f"{name}.md" for name in ("python", "command-help", "http-fields")}
+REFERENCE = {ROOT / "docs" / f"{name}.md" for name in ("python", "http-fields")}
 SHELL = ("bash", "console")
 #: what the reader of a page has, and ports and folders of this machine
 HERE = (

@@ -35,7 +35,6 @@ PAGES = tuple(
         "README.md",
         "docs/accuracy.md",
         "docs/speed-and-error.md",
-        "docs/hard-cases.md",
         "docs/python.md",
         "docs/operations.md",
         "docs/validation.md",
