@@ -18,10 +18,10 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import redirect_stdout, suppress
-from functools import cache
+from functools import cache, cached_property
 from itertools import pairwise
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any
 from unittest.mock import patch
 
@@ -49,8 +49,9 @@ COMMANDS = (
 #: the headings of the page on Python, each with its names; a module stands for all that it defines
 PYTHON = {
     "mumacro": (
-        "mumacro.open", "mumacro.Surrogate", "mumacro.Answer", "mumacro.REGIMES",
-        "mumacro.SOURCES", "mumacro.errors",
+        "mumacro.open", "mumacro.Surrogate", "mumacro.Answer", "mumacro.results.Result",
+        "mumacro.REGIMES", "mumacro.SOURCES", "mumacro.errors.MumacroError",
+        "mumacro.errors.InputError", "mumacro.errors.TextError", "mumacro.errors.TableError",
     ),
     "mumacro.fit, mumacro.fit_loop, mumacro.Element": (
         "mumacro.fit", "mumacro.Fit", "mumacro.fit_loop", "mumacro.LoopFit", "mumacro.Element",
@@ -65,18 +66,14 @@ PYTHON = {
         "mumacro.solve_for", "mumacro.questions.solve_for.TableSolution",
         "mumacro.questions.solve_for.Root", "mumacro.questions.solutions.Reach",
     ),
-    "mumacro.contacts.stiffening": ("mumacro.contacts.stiffening",),
     "mumacro.closed_forms": ("mumacro.closed_forms",),
     "mumacro.stiffness": ("mumacro.stiffness",),
-    "mumacro.validity": ("mumacro.validity",),
-    "mumacro.plotting": ("mumacro.plotting",),
-    "mumacro.files, mumacro.frames": (
-        "mumacro.files.answer", "mumacro.files.evaluate_files", "mumacro.frames",
-    ),
+    "mumacro.validity": ("mumacro.validity.notes_of", "mumacro.validity.ROWS"),
+    "mumacro.files": ("mumacro.files.answer", "mumacro.files.evaluate_files"),
     "mumacro.table": (
         "mumacro.table.blocks.Table", "mumacro.table.blocks.Block",
         "mumacro.table.blocks.BorderPiece", "mumacro.table.netcdf.read_table",
-        "mumacro.table.netcdf.write_table", "mumacro.table.atlas",
+        "mumacro.table.netcdf.write_table",
     ),
     "builder": (
         "builder.solver.steady.solve", "builder.solver.steady.Steady",
@@ -85,14 +82,14 @@ PYTHON = {
         "builder.figures.draw_figures",
     ),
 }  # fmt: skip
-PYTHON_INTRODUCTION = """Every name on this page is public. *array_like* arguments broadcast as in \
-NumPy, and a `float` argument gives a `float` result. Units in brackets are SI; inputs of one case \
-may also be [texts with a unit and values that carry one](units.md). Every result has \
-`to_dict()`, lists and numbers as JSON has them, and `to_frame()`, a DataFrame of pandas; in a \
-notebook it is a table. A solution with one root has it as `.value`. What `include`, `std` and \
-`remarks` give: [outputs, deviations, remarks](outputs.md). Answers in the shape of pandas, xarray \
-or Dask: [many cases](how-to/many-cases.md). The functions of `builder` need the extra `builder` \
-and are `mumacro.builder` in a wheel; those of `mumacro.files` need the extra `files`."""
+PYTHON_INTRODUCTION = """Every name on this page is public. *array_like* arguments broadcast as \
+in NumPy, and a `float` argument gives a `float` result. Units in brackets are SI; inputs of one \
+case may also be [texts with a unit and values that carry one](units.md). Every result also has \
+the members of [`Result`](#mumacroresultsresult), and is a table in a notebook. What `include`, \
+`std` and `remarks` give: [outputs, deviations, remarks](outputs.md). Answers in the shape of \
+pandas, xarray or Dask: [many cases](how-to/many-cases.md). The functions of `builder` need the \
+extra `builder` and are `mumacro.builder` in a wheel; those of `mumacro.files` need the extra \
+`files`."""
 
 
 # --- commands -------------------------------------------------------------------------------------
@@ -114,7 +111,7 @@ def help_of(command: str) -> str:
 
 def with_help(page: str) -> str:
     """Return a page with the help of every command between its markers made anew."""
-    helps = [f"### `{one} --help`\n\n```text\n{help_of(one)}\n```" for one in COMMANDS]
+    helps = [f"### {one}\n\n```text\n{help_of(one)}\n```" for one in COMMANDS]
     text = "\n\n".join(["<!-- begin help -->", *helps, "<!-- end help -->"])
     return re.sub(r"<!-- begin help -->.*?<!-- end help -->", lambda _: text, page, flags=re.DOTALL)
 
@@ -357,16 +354,25 @@ def _signature(value: Any) -> str:
     return re.sub(r"=(?!None|True|False|[-'\"(\d])[^,()]*(?:\([^)]*\))?", "=...", text)
 
 
-def _own(value: Any, module: str) -> bool:
+def _is_defined_in(value: Any, module: str) -> bool:
     return getattr(value, "__module__", None) == module
 
 
+#: members whose docstring is their own; a plain value has that of its type, a field of a named
+#: tuple one that counts fields
+DOCUMENTED = (FunctionType, classmethod, staticmethod, property, cached_property)
+
+
 def _class_page(title: str, value: type) -> Iterator[str]:
+    """Yield the parts of a class; what every result has is shown once, at ``Result``."""
     short = title.rsplit(".", 1)[1]
     yield f"### {title}\n\n```text\n{short}{_signature(value)}\n```"
     yield markdown_of(value.__doc__ or "")
+    shown = set[str]()
     for base in [value, *value.__mro__[1:-1]]:
         if not base.__module__.startswith(("mumacro", "builder")):
+            continue
+        if base.__qualname__ == "Result" and base is not value:
             continue
         attributes = [
             (name, _comment(base.__module__, base.__name__, name))
@@ -376,9 +382,10 @@ def _class_page(title: str, value: type) -> Iterator[str]:
         if attributes:
             yield "\n".join(f"- `{name}`: {told}" for name, told in attributes)
         for name, member in vars(base).items():
-            text = inspect.getdoc(member)
-            if name.startswith("_") or not text or (base is not value and name in vars(value)):
+            text = inspect.getdoc(member) if isinstance(member, DOCUMENTED) else None
+            if name.startswith("_") or not text or name in shown:
                 continue
+            shown.add(name)
             if isinstance(member, property) or not callable(getattr(value, name)):
                 yield f"#### `{short}.{name}`\n\n{markdown_of(text)}"
             else:
@@ -402,7 +409,11 @@ def _entry(title: str) -> Iterator[str]:
     if isinstance(value, ModuleType):
         yield markdown_of(value.__doc__ or "")
         for name, member in vars(value).items():
-            if not name.startswith("_") and _own(member, title) and inspect.getdoc(member):
+            if (
+                not name.startswith("_")
+                and _is_defined_in(member, title)
+                and inspect.getdoc(member)
+            ):
                 yield from _entry(f"{title}.{name}")
         for owner, name in _comments(title):
             if not owner and not name.startswith("_"):

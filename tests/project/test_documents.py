@@ -237,6 +237,16 @@ def test_the_pages_that_the_program_makes_are_what_it_makes_now() -> None:
     assert done.returncode == 0, done.stderr
 
 
+def test_the_reference_of_python_shows_no_docstring_of_python_itself() -> None:
+    text = (DOCS / "python.md").read_text("utf-8")
+    inherited = [(one.__doc__ or "").splitlines()[0] for one in (str, tuple, float, list, dict)]
+    assert all(inherited)
+    assert [line for line in [*inherited, "Alias for field number"] if line in text] == []
+    titles = re.findall(r"^#{3,4} (.+)$", text, re.MULTILINE)
+    assert len(titles) > 100
+    assert sorted({one for one in titles if titles.count(one) > 1}) == []
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_no_page_needs_a_directive_to_be_read(page: Path) -> None:
     directives = set(re.findall(r"^```\{(\S+)\}", page.read_text("utf-8"), re.M))
