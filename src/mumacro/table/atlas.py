@@ -78,17 +78,17 @@ class Axis:
     low: float
     high: float
 
-    @property
+    @functools.cached_property
     def knotted(self) -> bool:
         """Whether the middle must be an edge of cells."""
         return self.name == "s" or self.name in _FOLDED
 
-    @property
+    @functools.cached_property
     def edge(self) -> tuple[float, float]:
         """(end, scale) of evaluation's coordinate, end - scale sqrt(1 - x) next to x = 1."""
         return (2.0 * _KNOT, _SCALE) if self.name in _FOLDED else (SQRT2, 1.0)
 
-    @property
+    @functools.cached_property
     def span(self) -> tuple[float, float]:
         """The range of evaluation's coordinate; along s the cells cover all of [0, sqrt 2]."""
         return (0.0, self.edge[0]) if self.knotted else (self.low, self.high)
@@ -109,6 +109,23 @@ class Axis:
         low = np.arcsin(np.minimum(x, math.sqrt(0.5)))
         high = 0.5 * math.pi - np.arcsin(np.clip(SQRT2 - x, 0.0, math.sqrt(0.5)))
         return np.asarray(2.0 / math.pi * np.where(x <= math.sqrt(0.5), low, high))
+
+    def cell_positions(self, cells: int, local: Array) -> tuple[Array, Array]:
+        """Return the points ``local`` (m,), from -1 to 1, of each of the cells of this axis,
+        (cells m,): as evaluation's coordinate, and as positions in [-1, 1] on the nodes of the
+        table file.
+
+        Along s, points below the block are never visited; cells that lie wholly below it repeat its
+        edge.
+        """
+        start, stop = self.span
+        edge = np.arange(cells)[:, None]
+        x = (start + (stop - start) * (0.5 * (2.0 * edge + 1.0 + local[None, :]) / cells)).ravel()
+        position = self.to_file(x)
+        if self.name == "s":
+            below = self.to_file(SQRT2 * (np.arange(cells) + 1.0) / cells) <= self.low
+            position.reshape(cells, local.size)[below] = self.low
+        return x, (2.0 * position - self.low - self.high) / (self.high - self.low)
 
     def to_evaluation(self, x: Array) -> Array:
         """Return evaluation's coordinate at the table file's ``x`` (n,)."""

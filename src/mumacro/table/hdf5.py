@@ -8,7 +8,8 @@ are checked before memory is taken, and numbers are unpacked up to the size that
 
 import math
 import zlib
-from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import h5py
@@ -17,118 +18,102 @@ from h5py import h5a, h5d, h5f, h5g, h5l, h5o, h5s, h5t, h5z
 
 from mumacro.kernel.arrays import Array
 
-Refuse = Callable[[str], Exception]
-
-MOST_ATTRIBUTES = 64  # attributes of a group, at most, where all of them are read
+MOST_ATTRIBUTES = 64  # attributes of a group, at most
 MOST_TEXT = 65_536  # bytes of an attribute, at most
 MOST_ITEMS = 64  # numbers of an attribute, at most
 _FILTERS = ((), (h5z.FILTER_DEFLATE,), (h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE))
 
 
+class RefusedError(Exception):
+    """The reason why a file is refused."""
+
+
+@dataclass(frozen=True)
 class Group:
-    """One group; every method raises what ``refuse`` makes where a part is missing, of another kind
-    or too large."""
+    """What a group of a file holds, by name."""
 
-    def __init__(self, handle: Any, path: str, size: int, refuse: Refuse) -> None:
-        self._id, self.path, self._size, self.refuse = handle, path, size, refuse
+    path: str
+    #: texts, numbers, and vectors of numbers (n,) with n > 1, in the order in which they were made,
+    #: but for those of the netCDF library itself
+    attributes: dict[str, Any] = field(default_factory=dict)
+    arrays: dict[str, Array] = field(default_factory=dict)  #: finite float64
+    groups: dict[str, "Group"] = field(default_factory=dict)
 
-    def holds(self, name: str) -> bool:
-        """Return whether there is a group or variable of this name."""
-        return bool(self._id.links.exists(name.encode()))
 
-    def _open(self, name: str, part_type: type, role: str) -> Any:
-        if not self.holds(name) or self._id.links.get_info(name.encode()).type != h5l.TYPE_HARD:
-            # other links may lead to other files
-            raise self.refuse(f"{role} {name!r} is missing in {self.path}")
-        part = h5o.open(self._id, name.encode())
-        if not isinstance(part, part_type):
-            raise self.refuse(f"{name!r} in {self.path} is no {role}")
-        return part
+@dataclass(frozen=True)
+class Part:
+    """What is read of a group: variables and groups by name; what the file does not have is left
+    out."""
 
-    def group(self, name: str) -> "Group":
-        """Return a group in this one."""
-        path = f"{self.path.rstrip('/')}/{name}"
-        return Group(self._open(name, h5g.GroupID, "group"), path, self._size, self.refuse)
+    variables: tuple[str, ...] = ()
+    groups: Mapping[str, "Part"] = field(default_factory=dict)
 
-    # --- attributes -------------------------------------------------------------------------------
 
-    def has(self, name: str) -> bool:
-        """Return whether there is such an attribute."""
-        return bool(h5a.exists(self._id, name.encode()))
+class File:
+    """A file in memory; every method raises RefusedError where a part is of another kind or too
+    large."""
 
-    def attribute(self, name: str) -> Any:
-        """Return text, a number, or a vector of numbers (n,) with n > 1."""
-        if not self.has(name):
-            raise self.refuse(f"attribute {name!r} of {self.path} is missing")
-        return self._value(name, h5a.open(self._id, name.encode()))
+    def __init__(self, image: bytes, most: int, most_in_all: int) -> None:
+        """Open the bytes of a file, of which a variable may have ``most`` numbers, and all that is
+        read of them ``most_in_all``.
+
+        Raise RefusedError where they are no HDF5; in what is read later h5py raises nearly any
+        exception.
+        """
+        try:
+            file = h5f.open_file_image(image)
+        except Exception as error:
+            reason = "damaged, such as by a copy that was cut off, or another kind of file"
+            raise RefusedError(f"not a readable netCDF-4 table: {reason}") from error
+        self._root, self._size = h5g.open(file, b"/"), len(image)
+        self._most, self._rest = most, most_in_all
 
     def attributes(self) -> dict[str, Any]:
-        """Return all attributes but those of the netCDF library itself, in the order in which they
-        were made."""
-        count, by_age = h5a.get_num_attrs(self._id), h5py.h5.INDEX_CRT_ORDER
-        if count > MOST_ATTRIBUTES:
-            raise self.refuse(f"{self.path} has more than {MOST_ATTRIBUTES} attributes")
-        handles = (h5a.open(self._id, index=i, index_type=by_age) for i in range(count))
-        handle_by_name = {handle.name.decode(): handle for handle in handles}
-        return {
-            name: self._value(name, handle)
-            for name, handle in handle_by_name.items()
-            if not name.startswith("_")
-        }
+        """Return the attributes of the root, as :class:`Group` has them."""
+        return _attributes(self._root, "/")
 
-    def numbers(self, name: str, count: int) -> Array:
-        """Return an attribute of ``count`` finite numbers."""
-        values = np.atleast_1d(np.asarray(self.attribute(name)))
-        if (
-            values.dtype.kind not in "fi"
-            or values.shape != (count,)
-            or not np.all(np.isfinite(values))
-        ):
-            raise self.refuse(f"attribute {name!r} of {self.path} is not {count} finite numbers")
-        return values.astype(np.float64)
+    def read(self, part: Part) -> Group:
+        """Return the root with the parts that are named."""
+        return self._group(self._root, "/", part)
 
-    def _value(self, name: str, attribute: Any) -> Any:
-        hdf5_type, shape = attribute.get_type(), attribute.shape
-        if attribute.get_storage_size() > MOST_TEXT or math.prod(shape) > MOST_ITEMS:
-            raise self.refuse(f"attribute {name!r} of {self.path} is too large")
-        is_text = isinstance(hdf5_type, h5t.TypeStringID) and shape in ((), (1,))
-        if not is_text and not isinstance(hdf5_type, (h5t.TypeFloatID, h5t.TypeIntegerID)):
-            raise self.refuse(f"attribute {name!r} of {self.path} is neither text nor numbers")
-        values = np.empty(shape, hdf5_type.dtype if is_text else hdf5_type.dtype.newbyteorder("="))
-        attribute.read(values)
-        first = values.reshape(-1)[0] if values.size == 1 else values
-        return first.decode() if isinstance(first, bytes) else str(first) if is_text else first
+    def _group(self, handle: Any, path: str, part: Part) -> Group:
+        group = Group(path, _attributes(handle, path))
+        for name in part.variables:
+            variable = _member(handle, path, name, h5d.DatasetID, "variable")
+            if variable is not None:
+                group.arrays[name] = self._array(variable, f"variable {name!r} in {path}")
+        for name, inner in part.groups.items():
+            inside = _member(handle, path, name, h5g.GroupID, "group")
+            if inside is not None:
+                group.groups[name] = self._group(inside, f"{path.rstrip('/')}/{name}", inner)
+        return group
 
-    # --- numbers ----------------------------------------------------------------------------------
-
-    def array(self, name: str, most: int, shape: tuple[int, ...] | None = None) -> Array:
-        """Return a variable of finite float64, of at most ``most`` numbers, as the netCDF library
-        stores numbers."""
-        dataset = self._open(name, h5d.DatasetID, "variable")
+    def _array(self, dataset: Any, name: str) -> Array:
+        """Return a variable, as the netCDF library stores numbers."""
         space, creation = dataset.get_space(), dataset.get_create_plist()
         is_double = space.get_simple_extent_type() == h5s.SIMPLE and dataset.get_type().equal(
             h5t.IEEE_F64LE
         )
-        if not is_double or math.prod(space.shape) > most:
-            raise self.refuse(
-                f"variable {name!r} in {self.path} is no float64 array of at most {most} numbers"
-            )
-        if shape is not None and space.shape != shape:
-            raise self.refuse(f"{self.path}: the shape of {name!r} is {space.shape}, not {shape}")
+        count = math.prod(space.shape)
+        if not is_double or count > self._most:
+            raise RefusedError(f"{name} is no float64 array of at most {self._most} numbers")
+        self._rest -= count
+        if self._rest < 0:
+            raise RefusedError(f"{name} is one of more numbers than a table has")
         layout = creation.get_layout()
         filters = tuple(creation.get_filter(i)[0] for i in range(creation.get_nfilters()))
         if layout == h5d.CHUNKED and filters in _FILTERS and creation.get_chunk() == space.shape:
-            values = self._unpack(dataset, name, filters)
+            values = self._unpacked(dataset, name, filters)
         elif layout in (h5d.CONTIGUOUS, h5d.COMPACT) and not creation.get_external_count():
             values = np.empty(space.shape)
             dataset.read(h5s.ALL, h5s.ALL, values)
         else:
-            raise self.refuse(f"variable {name!r} in {self.path} is stored in an unknown way")
-        if not np.all(np.isfinite(values)):
-            raise self.refuse(f"variable {name!r} in {self.path} holds non-finite values")
+            raise RefusedError(f"{name} is stored in an unknown way")
+        if not np.isfinite(values).all():
+            raise RefusedError(f"{name} holds non-finite values")
         return values
 
-    def _unpack(self, dataset: Any, name: str, filters: tuple[int, ...]) -> Array:
+    def _unpacked(self, dataset: Any, name: str, filters: tuple[int, ...]) -> Array:
         """Return the one chunk of a variable, unpacked here with a limit: HDF5 itself has none."""
         size = 8 * math.prod(dataset.shape)
         if (
@@ -136,27 +121,52 @@ class Group:
             or (chunk := dataset.get_chunk_info(0)).size > self._size
             or chunk.filter_mask
         ):
-            raise self.refuse(f"variable {name!r} in {self.path} is stored in an unknown way")
+            raise RefusedError(f"{name} is stored in an unknown way")
         data = dataset.read_direct_chunk(chunk.chunk_offset)[1]
         if h5z.FILTER_DEFLATE in filters:
             data = zlib.decompressobj().decompress(data, size + 1)
         if len(data) != size:
-            raise self.refuse(f"variable {name!r} in {self.path} does not unpack to its size")
+            raise RefusedError(f"{name} does not unpack to its size")
         raw = np.frombuffer(data, np.uint8)
         if h5z.FILTER_SHUFFLE in filters:
             raw = np.ascontiguousarray(raw.reshape(8, -1).T)
         return raw.view(np.dtype("<f8")).reshape(dataset.shape).astype(np.float64)
 
 
-def open_image(image: bytes, refuse: Refuse) -> Group:
-    """Return the root of a file in memory; ``refuse`` makes the exception that is raised from a
-    reason.
+def _member(handle: Any, path: str, name: str, part_type: type, role: str) -> Any:
+    """Return a variable or a group in a group; None where there is none of this name."""
+    links, key = handle.links, name.encode()
+    # other links than hard ones may lead to other files
+    if not links.exists(key) or links.get_info(key).type != h5l.TYPE_HARD:
+        return None
+    part = h5o.open(handle, key)
+    if not isinstance(part, part_type):
+        raise RefusedError(f"{name!r} in {path} is no {role}")
+    return part
 
-    h5py raises nearly any exception where the bytes are no HDF5.
-    """
-    try:
-        file = h5f.open_file_image(image)
-    except Exception as error:
-        reason = "damaged, such as by a copy that was cut off, or another kind of file"
-        raise refuse(f"not a readable netCDF-4 table: {reason}") from error
-    return Group(h5g.open(file, b"/"), "/", len(image), refuse)
+
+def _attributes(handle: Any, path: str) -> dict[str, Any]:
+    count, by_age = h5a.get_num_attrs(handle), h5py.h5.INDEX_CRT_ORDER
+    if count > MOST_ATTRIBUTES:
+        raise RefusedError(f"{path} has more than {MOST_ATTRIBUTES} attributes")
+    values = {}
+    for i in range(count):
+        attribute = h5a.open(handle, index=i, index_type=by_age)
+        name = attribute.name.decode()
+        if not name.startswith("_"):
+            values[name] = _value(attribute, f"attribute {name!r} of {path}")
+    return values
+
+
+def _value(attribute: Any, name: str) -> Any:
+    """Return text, a number, or a vector of numbers."""
+    hdf5_type, shape = attribute.get_type(), attribute.shape
+    if attribute.get_storage_size() > MOST_TEXT or math.prod(shape) > MOST_ITEMS:
+        raise RefusedError(f"{name} is too large")
+    is_text = isinstance(hdf5_type, h5t.TypeStringID) and shape in ((), (1,))
+    if not is_text and not isinstance(hdf5_type, (h5t.TypeFloatID, h5t.TypeIntegerID)):
+        raise RefusedError(f"{name} is neither text nor numbers")
+    values = np.empty(shape, hdf5_type.dtype if is_text else hdf5_type.dtype.newbyteorder("="))
+    attribute.read(values)
+    first = values.reshape(-1)[0] if values.size == 1 else values
+    return first.decode() if isinstance(first, bytes) else str(first) if is_text else first

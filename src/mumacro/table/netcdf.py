@@ -29,6 +29,7 @@ from mumacro.table.blocks import (
     TabulatedContact,
     quantity_names,
 )
+from mumacro.table.hdf5 import RefusedError
 from mumacro.table.polynomials import nodes
 
 FORMAT_VERSION = 2
@@ -36,6 +37,7 @@ FORMAT_VERSION = 2
 # table that the builder makes
 MOST_BYTES = 16 * 2**20  # bytes of a file: 425 kB
 MOST_NUMBERS = 200_000  # numbers of a variable: 14,641
+MOST_IN_ALL = 2_000_000  # numbers of a table: 171,000
 MOST_NODES = 1024  # nodes along an axis: 91; preparing cells takes matrices of its square
 MOST_CELLS = 1024  # cells along an axis: 156
 MOST_PATCHES = 8192  # cells of a block: 1833; each takes 512 bytes for each quantity
@@ -89,20 +91,15 @@ def _digest(table: Table) -> str:
     include(*(getattr(table, name) for name in _PLAIN))
     for geometry, piece in zip(atlas.BORDER_PIECES, table.border, strict=True):
         include(geometry, piece.cells, float(piece.max_rel_error), piece.nodes, piece.values)
+    names = table.quantities
     for contact in table.contacts.values():
-        include(contact.name, contact.tolerance)
+        include(contact.name, float(contact.attributes["tolerance"]))
         for chart, block in zip(contact.charts, contact.blocks, strict=True):
             largest = float(block.max_abs_error), float(block.max_rel_error)
             include(chart, tuple(block.cells), *largest)
-            include(*(block.errors[name] for name in table.quantities), block.a, block.b)
-            include(
-                *(
-                    part[name]
-                    for part in (block.nodes, block.cell_errors)
-                    for name in table.quantities
-                    if name in part
-                )
-            )
+            include(*(block.errors[name] for name in names), block.a, block.b)
+            parts = block.nodes, block.cell_errors
+            include(*(part[name] for part in parts for name in names if name in part))
     return h.hexdigest()
 
 
@@ -257,154 +254,214 @@ def _image(table: Table) -> bytes:
 # --- reading --------------------------------------------------------------------------------------
 
 
-def _nodes(group: hdf5.Group, axis: atlas.Axis) -> Array:
-    """Return the nodes of an axis, which must be those of the running atlas."""
-    values = group.array(axis.name, MOST_NUMBERS)
-    if values.ndim != 1 or not 2 <= values.size <= MOST_NODES:
-        raise group.refuse(f"{group.path}: {axis.name!r} has not 2 to {MOST_NODES} nodes")
-    # the cosine's last digit differs between mathematical libraries
-    deviation = np.abs(values - nodes(values.size, axis.low, axis.high))
-    if np.any(deviation > 1e-15 * max(abs(axis.low), abs(axis.high))):
-        raise group.refuse(
-            f"{group.path}: the nodes of {axis.name!r} are not those of this program's chart"
-        )
+def _layout() -> hdf5.Part:
+    """Return what is read of a file."""
+    variables = tuple(quantity.variable for quantity in atlas.QUANTITIES)
+    groups = {name: hdf5.Part((axis.name, "value")) for name, axis, _ in atlas.BORDER_PIECES}
+    for name, charts in atlas.CHARTS.items():
+        blocks = {
+            chart.name: hdf5.Part((chart.a.name, chart.b.name, *variables)) for chart in charts
+        }
+        groups[name] = hdf5.Part(("cell_errors",), blocks)
+    return hdf5.Part(tuple(_PLAIN), {"border": hdf5.Part(groups=groups)})
+
+
+def _group(group: hdf5.Group, name: str) -> hdf5.Group:
+    if name not in group.groups:
+        raise RefusedError(f"group {name!r} is missing in {group.path}")
+    return group.groups[name]
+
+
+def _array(group: hdf5.Group, name: str, shape: tuple[int, ...] | None = None) -> Array:
+    if name not in group.arrays:
+        raise RefusedError(f"variable {name!r} is missing in {group.path}")
+    values = group.arrays[name]
+    if shape is not None and values.shape != shape:
+        raise RefusedError(f"{group.path}: the shape of {name!r} is {values.shape}, not {shape}")
     return values
 
 
-def _cells(group: hdf5.Group, count: int) -> list[int]:
-    cells = group.numbers("cells", count)
-    if not np.all((cells >= 1) & (cells <= MOST_CELLS) & (cells == np.round(cells))):
-        raise group.refuse(f"{group.path}: cells must be whole numbers from 1 to {MOST_CELLS}")
-    if np.prod(cells) > MOST_PATCHES:
-        raise group.refuse(f"{group.path}: has more than {MOST_PATCHES} cells")
-    return [int(n) for n in cells]
+def _attribute(group: hdf5.Group, name: str) -> Any:
+    if name not in group.attributes:
+        raise RefusedError(f"attribute {name!r} of {group.path} is missing")
+    return group.attributes[name]
 
 
-def _errors(group: hdf5.Group, name: str, errors: Array) -> Array:
+def _numbers(group: hdf5.Group, name: str, count: int = 1) -> Array:
+    """Return an attribute of ``count`` finite numbers."""
+    values = np.atleast_1d(np.asarray(_attribute(group, name)))
+    if values.dtype.kind not in "fi" or values.shape != (count,) or not np.all(np.isfinite(values)):
+        raise RefusedError(f"attribute {name!r} of {group.path} is not {count} finite numbers")
+    return values.astype(np.float64)
+
+
+def _not_negative(group: hdf5.Group, name: str, errors: Array) -> Array:
     if np.any(errors < 0.0):
-        raise group.refuse(f"{group.path}: an error in {name!r} is negative")
+        raise RefusedError(f"{group.path}: an error in {name!r} is negative")
     return errors
 
 
 def _error(group: hdf5.Group, name: str) -> float:
-    return float(_errors(group, name, group.numbers(name, 1))[0])
+    return float(_not_negative(group, name, _numbers(group, name))[0])
+
+
+def _axis_nodes(group: hdf5.Group, axis: atlas.Axis) -> Array:
+    """Return the nodes of an axis; :func:`_check_nodes` compares them with those of the running
+    atlas."""
+    values = _array(group, axis.name)
+    if values.ndim != 1 or not 2 <= values.size <= MOST_NODES:
+        raise RefusedError(f"{group.path}: {axis.name!r} has not 2 to {MOST_NODES} nodes")
+    return values
+
+
+def _check_nodes(nodes_of: list[tuple[str, atlas.Axis, Array]]) -> None:
+    """Refuse nodes, by the path of their group, that are not those of the running atlas."""
+    for path, axis, values in nodes_of:
+        # the cosine's last digit differs between mathematical libraries
+        deviation = np.abs(values - nodes(values.size, axis.low, axis.high))
+        if np.any(deviation > 1e-15 * max(abs(axis.low), abs(axis.high))):
+            raise RefusedError(
+                f"{path}: the nodes of {axis.name!r} are not those of this program's chart"
+            )
+
+
+def _cells(group: hdf5.Group, count: int) -> list[int]:
+    cells = _numbers(group, "cells", count)
+    if not np.all((cells >= 1) & (cells <= MOST_CELLS) & (cells == np.round(cells))):
+        raise RefusedError(f"{group.path}: cells must be whole numbers from 1 to {MOST_CELLS}")
+    if np.prod(cells) > MOST_PATCHES:
+        raise RefusedError(f"{group.path}: has more than {MOST_PATCHES} cells")
+    return [int(n) for n in cells]
 
 
 def _check_same(group: hdf5.Group, name: str, expected: Any) -> None:
-    value = group.attribute(name)
+    value = _attribute(group, name)
     if not np.array_equal(value, expected):
         printable = expected.tolist() if isinstance(expected, np.ndarray) else expected
-        raise group.refuse(
+        raise RefusedError(
             f"{group.path}: {name} is {value!r}, this program's atlas has {printable!r}"
         )
 
 
-def _contact_attributes(group: hdf5.Group) -> dict[str, Any]:
-    """Return what a table states of a contact; what the program uses is checked."""
+def _check_contact(group: hdf5.Group) -> None:
+    """Refuse what a table states of a contact, where the program could not use it."""
     for name in _STATED:
-        if not group.numbers(name, 1)[0] > 0.0:
-            raise group.refuse(
-                f"attribute {name!r} of {group.path} must be > 0, got {group.attribute(name)}"
+        if not _numbers(group, name)[0] > 0.0:
+            raise RefusedError(
+                f"attribute {name!r} of {group.path} must be > 0, got {group.attributes[name]}"
             )
-    names, shares = (group.attribute(f"verified_{name}") for name in ("quantities", "quantiles"))
+    names, shares = (_attribute(group, f"verified_{name}") for name in ("quantities", "quantiles"))
     if not isinstance(names, str):
-        raise group.refuse(f"attribute 'verified_quantities' of {group.path} is no text")
-    group.numbers("verified_quantiles", np.size(shares))
+        raise RefusedError(f"attribute 'verified_quantities' of {group.path} is no text")
+    _numbers(group, "verified_quantiles", np.size(shares))
     for name, count in (("error_quantiles", np.size(shares)), ("bound_over_error", len(RATIOS))):
-        if np.any(group.numbers(f"verified_{name}", count * len(names.split())) < 0.0):
-            raise group.refuse(f"attribute 'verified_{name}' of {group.path} has a negative number")
-    return group.attributes()
+        if np.any(_numbers(group, f"verified_{name}", count * len(names.split())) < 0.0):
+            raise RefusedError(f"attribute 'verified_{name}' of {group.path} has a negative number")
 
 
-def _attributes(root: hdf5.Group) -> dict[str, Any]:
-    """Return the attributes of the root; those that the program uses are checked."""
-    if not all(map(root.has, ("format_version", "content_sha256"))):
-        raise root.refuse("not a mumacro table: format_version or content_sha256 is missing")
-    version = root.attribute("format_version")
+def _check_root(attributes: dict[str, Any]) -> list[str]:
+    """Return the names of the tabulated quantities; refuse attributes of the root that the program
+    could not use."""
+    root = hdf5.Group("/", attributes)
+    if not {"format_version", "content_sha256"} <= attributes.keys():
+        raise RefusedError("not a mumacro table: format_version or content_sha256 is missing")
+    version = attributes["format_version"]
     if not np.array_equal(version, FORMAT_VERSION):
-        raise root.refuse(
+        raise RefusedError(
             f"format version {version}, this program reads {FORMAT_VERSION}: build the table anew "
             "with python -m builder build, or open it with the release that wrote it"
         )
-    attributes = root.attributes()
     if not isinstance(attributes["content_sha256"], str):
-        raise root.refuse("attribute 'content_sha256' is no text")
+        raise RefusedError("attribute 'content_sha256' is no text")
     for name in INTERPOLATION_ERRORS:
         _error(root, name)
     try:
         json.loads(attributes.get("builder_options", "{}"))
     except (ValueError, TypeError, RecursionError) as error:
-        raise root.refuse(f"attribute 'builder_options' is no JSON ({error})") from None
+        raise RefusedError(f"attribute 'builder_options' is no JSON ({error})") from None
     names = quantity_names(attributes)
     if names[:1] != ["mu_ratio"] or len({*names}) != len(names) or not {*names} <= BY_NAME.keys():
-        raise root.refuse(
+        raise RefusedError(
             f"attribute 'quantities' is {names}, this program knows {', '.join(BY_NAME)}"
         )
-    return attributes
+    return names
 
 
 def _border_piece(group: hdf5.Group, axis: atlas.Axis) -> BorderPiece:
     _check_same(group, "range", [axis.low, axis.high])
-    axis_nodes = _nodes(group, axis)
+    axis_nodes = _axis_nodes(group, axis)
     (cells,) = _cells(group, 1)
-    return BorderPiece(
-        axis_nodes,
-        group.array("value", MOST_NUMBERS, axis_nodes.shape),
-        cells,
-        _error(group, "max_rel_error"),
-    )
+    values = _array(group, "value", axis_nodes.shape)
+    return BorderPiece(axis_nodes, values, cells, _error(group, "max_rel_error"))
 
 
-def _block(group: hdf5.Group, chart: atlas.Chart, names: list[str]) -> Block:
+def _block(
+    group: hdf5.Group, chart: atlas.Chart, names: list[str], tabulated: list[atlas.TabulatedQuantity]
+) -> Block:
+    """Return a block of a table of the quantities ``names``, of which it has those that are
+    ``tabulated``."""
     for name, expected in _geometry(chart).items():
         _check_same(group, name, expected)
-    a, b = _nodes(group, chart.a), _nodes(group, chart.b)
-    quantities = [BY_NAME[name] for name in names if chart.holds(BY_NAME[name])]
-    node_values = {
-        quantity.name: group.array(quantity.variable, MOST_NUMBERS, (a.size, b.size))
-        for quantity in quantities
-    }
+    a, b = _axis_nodes(group, chart.a), _axis_nodes(group, chart.b)
     na, nb = _cells(group, 2)
+    node_values = {
+        quantity.name: _array(group, quantity.variable, (a.size, b.size)) for quantity in tabulated
+    }
     block = Block(a, b, (na, nb), node_values)
     block.max_abs_error, block.max_rel_error = (
         _error(group, f"verified_max_{norm}_error") for norm in ("abs", "rel")
     )
-    errors = _errors(group, "errors", group.numbers("errors", 3 * len(names)))
+    errors = _not_negative(group, "errors", _numbers(group, "errors", 3 * len(names)))
     block.errors.update(zip(names, errors.reshape(-1, 3), strict=True))
     return block
 
 
-def _contact(group: hdf5.Group, name: str, quantities: list[str]) -> TabulatedContact:
-    contact = TabulatedContact(name, [], _contact_attributes(group))
-    contact.blocks += (
-        _block(group.group(chart.name), chart, quantities) for chart in contact.charts
-    )
-    _add_cell_errors(group, contact.blocks, quantities)
-    return contact
+def _contact(group: hdf5.Group, name: str, names: list[str]) -> TabulatedContact:
+    _check_contact(group)
+    charts = atlas.CHARTS[name]
+    tabulated = [[BY_NAME[q] for q in names if chart.holds(BY_NAME[q])] for chart in charts]
+    blocks = [
+        _block(_group(group, chart.name), chart, names, quantities)
+        for chart, quantities in zip(charts, tabulated, strict=True)
+    ]
+    _add_cell_errors(group, blocks, names)
+    axes = [
+        (group.groups[chart.name].path, axis, values)
+        for chart, block in zip(charts, blocks, strict=True)
+        for axis, values in ((chart.a, block.a), (chart.b, block.b))
+    ]
+    _check_nodes(axes)
+    return TabulatedContact(name, blocks, group.attributes)
 
 
 def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: Sequence[str]) -> None:
     last = np.cumsum([block.cells[0] * block.cells[1] for block in blocks])
-    numbers = group.array("cell_errors", MOST_NUMBERS, (len(names), int(last[-1]), 3))
-    for name, errors in zip(names, _errors(group, "cell_errors", numbers), strict=True):
+    numbers = _array(group, "cell_errors", (len(names), int(last[-1]), 3))
+    for name, errors in zip(names, _not_negative(group, "cell_errors", numbers), strict=True):
         for block, part in zip(blocks, np.split(errors, last[:-1]), strict=True):
             if name in block.nodes:
                 block.cell_errors[name] = part
 
 
-def _read(root: hdf5.Group) -> Table:
-    attributes = _attributes(root)
-    names = quantity_names(attributes)
-    below = root.group("border")
-    border = [_border_piece(below.group(name), axis) for name, axis, _ in atlas.BORDER_PIECES]
-    contacts = {name: _contact(below.group(name), name, names) for name in atlas.CHARTS}
+def _read(file: hdf5.File) -> Table:
+    names = _check_root(file.attributes())  # another version may have other parts
+    root = file.read(_layout())
+    below = _group(root, "border")
+    border = [_border_piece(_group(below, name), axis) for name, axis, _ in atlas.BORDER_PIECES]
+    _check_nodes(
+        [
+            (below.groups[name].path, axis, piece.nodes)
+            for (name, axis, _), piece in zip(atlas.BORDER_PIECES, border, strict=True)
+        ]
+    )
+    contacts = {name: _contact(_group(below, name), name, names) for name in atlas.CHARTS}
     plain: dict[str, Array] = {}
     for name, (_, axes) in _PLAIN.items():  # the two axes come first
         shape = tuple(plain[axis].size for axis in axes) if axes else None
-        plain[name] = root.array(name, MOST_NUMBERS, shape)
+        plain[name] = _array(root, name, shape)
         if not axes and plain[name].ndim != 1:
-            raise root.refuse(f"variable {name!r} in / is no axis")
-    return Table(border=border, contacts=contacts, attributes=attributes, **plain)
+            raise RefusedError(f"variable {name!r} in / is no axis")
+    return Table(border=border, contacts=contacts, attributes=root.attributes, **plain)
 
 
 def read_table(path: str | Path) -> Table:
@@ -424,10 +481,10 @@ def parse_table(image: bytes, path: str | Path) -> Table:
     """Read a table as :func:`read_table`, from the bytes of the file; ``path`` names it in
     errors."""
     try:
-        table = _read(hdf5.open_image(image, lambda reason: TableError(path, reason)))
+        table = _read(hdf5.File(image, MOST_NUMBERS, MOST_IN_ALL))
         digest = _digest(table)
-    except TableError:
-        raise
+    except RefusedError as refused:
+        raise TableError(path, str(refused)) from refused.__cause__
     except Exception as error:  # h5py raises nearly any exception
         raise TableError(
             path, f"not a readable netCDF-4 table ({type(error).__name__}: {error})"

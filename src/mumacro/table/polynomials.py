@@ -73,27 +73,10 @@ def _count(axis: Axis, cells: int) -> tuple[float, float]:
     return -step * start, step
 
 
-def cell_positions(axis: Axis, cells: int) -> tuple[Array, Array]:
-    """Return points of all cells of one axis: as evaluation's coordinate and as positions in [-1,
-    1] on the axis of nodes.
-
-    Along s, points below the block are never visited; cells that lie wholly below it repeat its
-    edge.
-    """
-    start, stop = axis.span
-    edge = np.arange(cells)[:, None]
-    x = (start + (stop - start) * (0.5 * (2.0 * edge + 1.0 + LOCAL[None, :]) / cells)).ravel()
-    position = axis.to_file(x)
-    if axis.name == "s":
-        below = axis.to_file(atlas.SQRT2 * (np.arange(cells) + 1.0) / cells) <= axis.low
-        position.reshape(cells, WIDTH)[below] = axis.low
-    return x, (2.0 * position - axis.low - axis.high) / (axis.high - axis.low)
-
-
 def cells_1d(piece: int, values: Array, cells: int) -> Array:
     """Return power-basis coefficients (cells, WIDTH), highest power first, of a piece of v~crit
     with node ``values`` (n,)."""
-    x, positions = cell_positions(atlas.BORDER_PIECES[piece][1], cells)
+    x, positions = atlas.BORDER_PIECES[piece][1].cell_positions(cells, LOCAL)
     local = (
         interpolation_matrix(values.size, positions)
         @ chebyshev_coefficients(values)
@@ -129,10 +112,16 @@ def cells_2d(a: Axis, b: Axis, values: Array, cells: tuple[int, int]) -> Array:
     Axis 1 counts powers of the b coordinate, axis 2 powers of the a coordinate, both from 7 down to
     0.
     """
+    (_, on_a), (_, on_b) = a.cell_positions(cells[0], LOCAL), b.cell_positions(cells[1], LOCAL)
+    return _patches(on_a, on_b, values)
+
+
+def _patches(on_a: Array, on_b: Array, values: Array) -> Array:
+    """Return :func:`cells_2d`, from the positions of the cells' points on both axes of nodes."""
     # Cell by cell: for larger products BLAS starts threads, which take more time than they save.
     along_a, along_b = (
-        interpolation_matrix(n, cell_positions(axis, count)[1]).reshape(count, WIDTH, n)
-        for axis, n, count in zip((a, b), values.shape, cells, strict=True)
+        interpolation_matrix(n, positions).reshape(-1, WIDTH, n)
+        for positions, n in zip((on_a, on_b), values.shape, strict=True)
     )
     local = (along_a @ chebyshev_coefficients(values))[:, None] @ along_b.transpose(0, 2, 1)
     mean = local.mean(axis=(2, 3))
@@ -184,19 +173,26 @@ def quantity_cells(contact: TabulatedContact, code: int) -> tuple[Array, Array, 
     """Return a quantity for :meth:`mumacro.kernel.binding.Data.add_quantity`: polynomials, errors,
     errors in every cell."""
     name, errors = atlas.QUANTITY_NAMES[code], np.zeros((len(atlas.SOURCES) + 1, 2))
+    positions = [
+        [
+            axis.cell_positions(count, LOCAL)[1]
+            for axis, count in zip((chart.a, chart.b), block.cells, strict=True)
+        ]
+        for chart, block in zip(contact.charts, contact.blocks, strict=True)
+    ]
     patches, in_cells = [], []
-    for error, chart, block in zip(errors, contact.charts, contact.blocks, strict=False):
+    for error, chart, block, on_axes in zip(
+        errors, contact.charts, contact.blocks, positions, strict=False
+    ):
         cells = block.cells[0] * block.cells[1]
         nodes = block.nodes.get(name)
+        # zero where the block does not tabulate the quantity
         patches.append(
-            np.zeros((cells, WIDTH, WIDTH))
-            if nodes is None
-            else cells_2d(chart.a, chart.b, nodes, block.cells)
+            np.zeros((cells, WIDTH, WIDTH)) if nodes is None else _patches(*on_axes, nodes)
         )
         error[0] = block.errors[name][0]
         if code == atlas.MU:
             error += chart.rounding, chart.floor
-        # zero where the block does not tabulate the quantity
         in_cells.append(block.cell_errors.get(name, np.zeros((cells, 3))))
     return _join_patches(patches), errors, np.concatenate(in_cells)
 
