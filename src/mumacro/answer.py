@@ -220,16 +220,10 @@ class Answer(Result, Generic[Number]):
     def cases(self) -> Cases:
         """The cases that were evaluated."""
         if self._cases is None:
-            if self._plain is None:
-                raise AttributeError("these labelled cases are not kept")
             kind, six, with_f = self._plain
             columns: dict[str, Any] = dict(zip(kind.fields, map(float, six), strict=True))
             self._cases = Cases(kind, columns, (), f=six[4] / RAD_PER_CYCLE if with_f else None)
         return self._cases
-
-    @property
-    def _has_cases(self) -> bool:
-        return self._cases is not None or self._plain is not None
 
     @property
     def notes(self) -> list[Note]:
@@ -240,8 +234,6 @@ class Answer(Result, Generic[Number]):
     def notes_in(self, units: Mapping[str, str]) -> list[Note]:
         """Return :attr:`notes`, with a value in the unit that ``units`` has for its input, as it
         was typed."""
-        if not self._has_cases:
-            return [*self.notes_on_outputs]
         cases = self.cases
         on_inputs = doubts(cases.columns, cases.f is not None, {**cases.units, **units})
         return [*on_inputs, *self.notes_on_outputs]
@@ -318,8 +310,6 @@ class Answer(Result, Generic[Number]):
         return members
 
     def _kind_words(self) -> str:
-        if not self._has_cases:
-            return ""
         return f": {', '.join(self.cases.kind.names.values())}"
 
     def _heading(self) -> str:
@@ -333,7 +323,7 @@ class Answer(Result, Generic[Number]):
         return np.shape(mu)
 
     def _is_one(self) -> bool:
-        return self._has_cases and not self._shape
+        return not self._shape
 
     def _rows(self) -> Rows | None:
         return [(path, cell(x)) for path, x in self.columns.items()] if self._is_one() else None

@@ -665,6 +665,25 @@ def _mark(ax: Any, marks: Marks, normal: bool, halo: Any) -> None:
         )
 
 
+# --- an oscillation -------------------------------------------------------------------------------
+
+
+def plot_harmonics(orders: Array, amplitudes: Array, rms: float, title: str, ax: Any = None) -> Any:
+    """Return amplitudes (n,) over their harmonics (n,), and the root mean square of what they leave
+    out, in the unit of the samples."""
+    ax = axes_for(ax)
+    top = max(float(amplitudes.max(initial=0.0)), rms)
+    ax.vlines(orders, 0.0, amplitudes, color="C0")
+    ax.plot(orders, amplitudes, "o", color="C0", label="amplitude")
+    ax.axhline(rms, color=_ink(), ls=":", alpha=0.7, label="rms of what is left out")
+    last = int(orders.max(initial=1))
+    ax.set(xlim=(0.0, last + 1.0), ylim=(0.0, 1.1 * top if top > 0.0 else 1.0))
+    ax.xaxis.set_major_locator(_loaded("ticker").MaxNLocator(integer=True))
+    ax.set(xlabel="harmonic", ylabel="amplitude, in the unit of the samples")
+    head(ax, title)
+    return ax
+
+
 # --- a steady cycle -------------------------------------------------------------------------------
 
 
@@ -675,21 +694,25 @@ def plot_cycle(
     Fx: Array,
     Fy: Array,
     Fz: Array,
-    mu0: float,
-    title: str,
+    mu0: float | None = None,
+    title: str = "",
     ax: Any = None,
 ) -> Any:
-    """Return forces of one period over time, with the limit mu0 Fz, and the path of the upper point
-    with the force at 16 moments; all (n,), in SI. ``ax`` are two axes, or new ones; on one alone
-    there is no path. Those of the forces are returned."""
+    """Return forces of one period over time, with the limit mu0 Fz where mu0 is known, and the path
+    of the upper point with the force at 16 moments; all (n,), in SI.
+
+    ``ax`` are two axes, or new ones; on one alone there is no path.  Those of the forces are
+    returned.
+    """
     pair = axes_for(ax, OF_CYCLE)
     forces, path = pair if np.ndim(pair) else (pair, None)
     ink = _ink()
     share = (t - t[0]) / (t[-1] - t[0])
     forces.plot(share, Fx, color="C0", label="$F_x$, along the drag")
     forces.plot(share, Fy, color="C1", label="$F_y$, across")
-    forces.plot(share, mu0 * Fz, ":", color=ink, alpha=0.7, label=r"$\pm\mu_0 F_z$")
-    forces.plot(share, -mu0 * Fz, ":", color=ink, alpha=0.7)
+    if mu0 is not None:
+        forces.plot(share, mu0 * Fz, ":", color=ink, alpha=0.7, label=r"$\pm\mu_0 F_z$")
+        forces.plot(share, -mu0 * Fz, ":", color=ink, alpha=0.7)
     mean = float(np.sum((Fx[1:] + Fx[:-1]) * np.diff(share)) / 2.0)
     forces.axhline(mean, lw=0.8, color="C0", ls="--", label="mean of $F_x$")
     forces.set(xlabel="share of the period [-]", ylabel="force [N]", xlim=(0.0, 1.0))

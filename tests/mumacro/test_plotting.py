@@ -20,6 +20,7 @@ pyplot.switch_backend("agg")
 
 CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.01}
 SPEEDS = np.geomspace(1e-4, 10.0, 9)
+TURN = np.arange(64) * math.tau / 64
 RIG: Case = {"Fz": 10.0, "f": 20e3}
 kinds = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: "-".join(kind.names.values()))
 
@@ -69,6 +70,8 @@ PICTURES: dict[str, Callable[[Surrogate], Any]] = {
     "motion": lambda _: mumacro.motion(
         **MOTION, x=[(1, 1e-4, 0.0), (3, 2e-5, 45.0)], y=2e-5, normal=(8.0, -90.0)
     ),
+    "cycle": lambda _: mumacro.motion(**MOTION, x=1e-4, y=2e-5, normal=(8.0, -90.0)).cycle(),
+    "harmonics": lambda _: mumacro.harmonics(np.sin(TURN) + 0.2 * np.cos(3.0 * TURN) + 1.0),
     "solution": lambda s: mumacro.solve_for(s, "y0", [0.1, 0.2], **case_of(KINDS[0], y0=None)),
     "solution over f": lambda s: mumacro.solve_for(
         s, "f", 0.2, within=("1kHz", "1MHz"), **case_of(KINDS[0], f=None)

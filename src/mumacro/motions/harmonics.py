@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mumacro import plotting
 from mumacro.errors import InputError
 from mumacro.inputs.carried import carried_unit
 from mumacro.inputs.columns import to_si
@@ -45,8 +46,19 @@ class Harmonics(Result):
             "phase": np.array(phases),
         }
 
+    def plot(self, ax: Any = None) -> Any:
+        """Return the amplitude of each harmonic, and the root mean square of what they leave out.
+
+        ``ax`` are axes of matplotlib, or new ones; they are returned.
+        """
+        columns = self.columns
+        title = f"mean {self.mean:.6g}, rms of what is left out {self.rms:.3g}"
+        return plotting.plot_harmonics(
+            columns["harmonic"], columns["amplitude"], self.rms, title, ax
+        )
+
     def _members(self) -> dict[str, Any]:
-        """Return each term is a dict, as HTTP takes it."""
+        """Return the terms as dicts, as HTTP takes them, and what they leave out."""
         names = ("harmonic", "amplitude", "phase")
         terms = [dict(zip(names, term, strict=True)) for term in self.terms]
         return {

@@ -76,6 +76,15 @@ class Cycle(Result, _Cycle):
         """The times, and what is there at each."""
         return self._asdict()
 
+    def plot(self, ax: Any = None) -> Any:
+        """Return the forces over the period, and beside them the path of the upper point with the
+        force at 16 moments.
+
+        ``ax`` are two axes of matplotlib, or one, which gets no path, or new ones; those of the
+        forces are returned.
+        """
+        return plotting.plot_cycle(*self, ax=ax)
+
     def _heading(self) -> str:
         return f"<Cycle of {self.t.size} times>"
 
