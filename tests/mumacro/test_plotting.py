@@ -122,7 +122,7 @@ def test_nothing_is_cut_off_and_the_style_stays(
 @pytest.mark.parametrize(
     ("name", "panels"),
     [(name, 1) for name in PICTURES]
-    + [(name, 2) for name in PICTURES if name.startswith(("motion", "fit"))],
+    + [(name, 2) for name in PICTURES if name.startswith(("motion", "cycle", "fit"))],
 )
 def test_axes_that_are_given_are_drawn_on_and_the_first_are_returned(
     surrogate: Surrogate, name: str, panels: int

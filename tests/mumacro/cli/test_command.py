@@ -8,6 +8,7 @@ import os
 import shlex
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,11 @@ from mumacro import InputError, Surrogate, fit
 from mumacro.cli.main import COMMANDS, main
 from mumacro.contacts.geometries import GEOMETRIES, contact_of
 from mumacro.inputs.case import read_one
+from mumacro.inputs.cases import Cases
 from mumacro.inputs.fields import ENDS, NAMES, SI
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.units import UNITS_OF, scale_of, split_unit
+from mumacro.outputs.tabulated import Tabulated
 from mumacro.validity import rows_of
 from tests.support.cases import Capture, Case
 from tests.support.comparing import close
@@ -62,6 +65,30 @@ def test_one_case_is_answered_with_units_regime_bound_and_source(
     assert " to " in interval.partition("[-]")[0]
     assert json.loads(output_of(capsys, 0, CASE, "--json", "--model"))["model"] == rows_of(expected)
     assert "model" not in json.loads(output_of(capsys, 0, CASE, "--json"))
+
+
+@pytest.mark.parametrize("words", [[], ["--json"], ["--json", "--model"], ["--contact", "ball"]])
+@pytest.mark.parametrize("case", [CASE, CASE.replace("k=1e6", "k=rigid")])
+def test_one_case_is_made_and_evaluated_once(
+    capsys: Capture, monkeypatch: pytest.MonkeyPatch, case: str, words: list[str]
+) -> None:
+    """What is said beside an answer is made of what was evaluated."""
+    calls = Counter[str]()
+
+    def count(owner: Any, name: str) -> None:
+        function = getattr(owner, name)
+
+        def counted(*arguments: Any, **named: Any) -> Any:
+            calls[name] += 1
+            return function(*arguments, **named)
+
+        monkeypatch.setattr(owner, name, counted)
+
+    count(Cases, "__new__")
+    for name in ("one", "rows", "extremes"):
+        count(Tabulated, name)
+    output_of(capsys, 0, case, *words)
+    assert calls == {"__new__": 1, "one": 1}
 
 
 @pytest.mark.parametrize("name", ["mumacro-1e-4.nc", "mumacro-1e-10.nc"])
