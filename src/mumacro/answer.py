@@ -112,8 +112,8 @@ class Answer(Result, Generic[Number]):
         self.source_code = source_code
         self._groups = groups
         self._cases: Cases | None = cases
-        #: of one case in plain numbers its kind, the six, and whether f was given
-        self._plain: tuple[Kind, tuple[float, ...], bool] | None = None
+        #: in place of cases, of one case in plain numbers: its kind, the six, whether f was given
+        self._plain: tuple[Kind, tuple[float, ...], bool]
         self._surrogate = surrogate
         self.gradient = self.gradient_bound = None
         self.outputs: Mapping[str, Any] = _NOTHING

@@ -34,14 +34,13 @@ from mumacro.inputs.fields import (
     in_help,
     kind_of,
 )
-from mumacro.inputs.layout import SEPARATORS, Dialect
 from mumacro.inputs.names import suggestion
-from mumacro.inputs.numbers import THOUSANDS, check_signs
+from mumacro.inputs.numbers import check_signs
 from mumacro.inputs.units import belongs_to_value, unit_of
 from mumacro.notes import Note
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import names_in
-from mumacro.results import choose_unit, format_number, tidy_zeros
+from mumacro.results import choose_unit, format_number, listed, tidy_zeros
 from mumacro.surrogate import Surrogate
 
 ABOUT_INPUTS = f"""\
@@ -162,46 +161,6 @@ def add_table(parser: OneLineParser) -> None:
     text = "a file, or the largest error; default: the tightest bundled one"
     parser.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
     add_form(parser)
-
-
-def add_format(parser: argparse.ArgumentParser) -> None:
-    """Add the options for the form of a table as text; :func:`dialect_in` reads them."""
-    for name, choices, text in (
-        ("sep", SEPARATORS, "between the cells"),
-        ("decimal", (".", ","), "in numbers"),
-        ("thousands", THOUSANDS, "between thousands"),
-    ):
-        words = f"{text}: {' '.join(choices)}; default: as the table has"
-        parser.add_argument(f"--{name}", choices=choices, metavar="SIGN", help=words)
-    parser.add_argument("--encoding", metavar="NAME", help="such as utf-16; default: found out")
-    parser.add_argument("--skip", type=int, default=0, metavar="N", help="leave out N lines")
-    text = "the first and the last line of data, as 4..12"
-    parser.add_argument("--rows", type=_lines, metavar="A..B", help=text)
-    text = "of a workbook; default: the one that has the names of the columns"
-    parser.add_argument("--sheet", metavar="NAME", help=text)
-
-
-def _lines(text: str) -> tuple[int, int]:
-    """Return the numbers of two lines; argparse says the fault of another text."""
-    first, dots, last = text.partition("..")
-    if not (dots and first.isdecimal() and last.isdecimal() and 0 < int(first) <= int(last)):
-        raise argparse.ArgumentTypeError(f"{text!r}: must be two numbers of lines, as 4..12")
-    return int(first), int(last)
-
-
-def dialect_in(options: argparse.Namespace) -> Dialect:
-    """Return how a table as text is written, as far as the options say."""
-    if options.skip < 0:
-        raise UsageError(f"--skip {options.skip}: a number of lines, 0 or more")
-    return Dialect(
-        None if options.sep is None else SEPARATORS[options.sep],
-        options.decimal,
-        None if options.thousands is None else THOUSANDS[options.thousands],
-        options.encoding,
-        options.skip,
-        rows=options.rows,
-        sheet=options.sheet,
-    )
 
 
 def add_exponent(parser: OneLineParser) -> None:
@@ -535,14 +494,4 @@ def write_result(
 
 def as_json(value: object) -> str:
     """Return JSON in which what is not finite is null."""
-
-    def clean(item: Any) -> Any:
-        if isinstance(item, dict):
-            return {key: clean(entry) for key, entry in item.items()}
-        if isinstance(item, (list, tuple)):
-            return [clean(entry) for entry in item]
-        if isinstance(item, (np.generic, np.ndarray)):
-            return clean(item.tolist())
-        return None if isinstance(item, float) and not math.isfinite(item) else item
-
-    return json.dumps(clean(value), indent=2)
+    return json.dumps(listed(value), indent=2)

@@ -11,13 +11,12 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from mumacro.cli.common import (
     OneLineParser,
-    add_format,
     add_include,
     add_kind,
-    dialect_in,
     included,
     open_table,
 )
+from mumacro.cli.table_format import add_format, dialect_in
 from mumacro.files.run import evaluate_files
 from mumacro.notes import Remark
 

@@ -18,6 +18,7 @@ from mumacro.cli.common import (
     in_columns,
     open_table,
 )
+from mumacro.cli.table_format import add_format, dialect_in
 from mumacro.errors import InputError, TextError
 from mumacro.fits.fit import fit
 from mumacro.fits.fitted import Fit
@@ -52,7 +53,7 @@ def _parser() -> OneLineParser:
         help="k, mu0; default: both, k alone beside a column mu0",
     )
     parser.add_argument("--plot", dest="out", type=Path, metavar="FILE", help="the same as --out")
-    common.add_format(parser)
+    add_format(parser)
     return parser
 
 
@@ -67,7 +68,7 @@ def run(words: Sequence[str]) -> str:
     kind = common.kind_in(options)
     source = sys.stdin.buffer.read() if options.points == "-" else Path(options.points)
     try:
-        table = read_points(source, common.dialect_in(options))
+        table = read_points(source, dialect_in(options))
     except TextError as error:
         raise ImpossibleError(f"{options.points}: {error}") from None
     points: dict[str, Any] = {**table.columns}

@@ -9,6 +9,7 @@ from typing import Any
 from mumacro import plotting
 from mumacro.cli import common
 from mumacro.cli.common import ImpossibleError, OneLineParser, UsageError, as_json, in_columns
+from mumacro.cli.table_format import add_format, dialect_in
 from mumacro.errors import InputError, TextError
 from mumacro.fits.loop import fit_loop
 from mumacro.fits.loop_fitted import LoopFit
@@ -56,7 +57,7 @@ def _parser() -> OneLineParser:
     parser.add_argument("-o", "--out", type=Path, help=text)
     parser.add_argument("--plot", dest="out", type=Path, metavar="FILE", help="the same as --out")
     parser.add_argument("--json", action="store_true", help="print JSON, with all digits")
-    common.add_format(parser)
+    add_format(parser)
     return parser
 
 
@@ -73,7 +74,7 @@ def run(words: Sequence[str]) -> str:
     column_names = ColumnNames(like, [(name,) for name in names.values()])
     source = sys.stdin.buffer.read() if options.loop == "-" else Path(options.loop)
     try:
-        table = read_numbers(source, column_names, common.dialect_in(options))
+        table = read_numbers(source, column_names, dialect_in(options))
     except TextError as error:
         raise ImpossibleError(f"{options.loop}: {error}") from None
     columns = {what: table.columns[name] for what, name in names.items()}

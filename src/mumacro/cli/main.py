@@ -13,18 +13,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from mumacro.cli import common, fit, fit_loop, law, motion, one_case, solve_for, stiffness, table
-from mumacro.cli import map as map_
+from mumacro.cli import common, one_case
 from mumacro.cli.common import ImpossibleError, UsageError
 from mumacro.errors import missing
 from mumacro.inputs.fields import NAMES
 from mumacro.table.bundled import bundled_tables
 
-FIRST = f"""\
-friction of one case:      mumacro "{one_case.EXAMPLE}"
-friction along the speed:  {law.EXAMPLE}
-which amplitude halves it: {solve_for.EXAMPLE}
-everything else:           mumacro --help"""
 _TASKS = {
     f'mumacro "{one_case.EXAMPLE}"': "one case",
     "mumacro eval cases.parquet -o out.parquet": "files: text, xlsx, parquet",
@@ -83,25 +77,46 @@ def _serve(words: Sequence[str]) -> int:
     return int(service.main(list(words), "mumacro serve"))
 
 
-COMMANDS: dict[str, Callable[[Sequence[str]], int | str]] = {
+Command = Callable[[Sequence[str]], int | str]
+
+
+def _in_module(name: str) -> Command:
+    """Return a command whose module is loaded when it is called: one case starts sooner
+    without."""
+    return lambda words: importlib.import_module(f"mumacro.cli.{name}").run(words)
+
+
+COMMANDS: dict[str, Command] = {
     "eval": _eval,
-    "law": law.run,
-    "solve-for": solve_for.run,
-    "map": map_.run,
-    "motion": motion.run,
-    "fit": fit.run,
-    "fit-loop": fit_loop.run,
-    "stiffness": stiffness.run,
-    "table": table.run,
+    "law": _in_module("law"),
+    "solve-for": _in_module("solve_for"),
+    "map": _in_module("map"),
+    "motion": _in_module("motion"),
+    "fit": _in_module("fit"),
+    "fit-loop": _in_module("fit_loop"),
+    "stiffness": _in_module("stiffness"),
+    "table": _in_module("table"),
     "export": _export,
     "serve": _serve,
 }
 
 
+def _first_steps() -> str:
+    """Return what a person sees who wrote nothing."""
+    from mumacro.cli import law, solve_for
+
+    return (
+        f'friction of one case:      mumacro "{one_case.EXAMPLE}"\n'
+        f"friction along the speed:  {law.EXAMPLE}\n"
+        f"which amplitude halves it: {solve_for.EXAMPLE}\n"
+        "everything else:           mumacro --help"
+    )
+
+
 def _no_command(words: Sequence[str]) -> str:
     """Return a case, or what helps a person who wrote something else."""
     if not words:
-        return FIRST
+        return _first_steps()
     similar = difflib.get_close_matches(words[0], COMMANDS, n=1, cutoff=0.7)
     if similar and words[0] not in NAMES:
         raise UsageError(f"unknown command {words[0]!r}: did you mean {similar[0]}?")

@@ -396,7 +396,10 @@ def _border_piece(group: hdf5.Group, axis: atlas.Axis) -> BorderPiece:
 
 
 def _block(
-    group: hdf5.Group, chart: atlas.Chart, names: list[str], tabulated: list[atlas.TabulatedQuantity]
+    group: hdf5.Group,
+    chart: atlas.Chart,
+    names: list[str],
+    tabulated: list[atlas.TabulatedQuantity],
 ) -> Block:
     """Return a block of a table of the quantities ``names``, of which it has those that are
     ``tabulated``."""

@@ -174,10 +174,10 @@ def quantity_cells(contact: TabulatedContact, code: int) -> tuple[Array, Array, 
     errors in every cell."""
     name, errors = atlas.QUANTITY_NAMES[code], np.zeros((len(atlas.SOURCES) + 1, 2))
     positions = [
-        [
-            axis.cell_positions(count, LOCAL)[1]
-            for axis, count in zip((chart.a, chart.b), block.cells, strict=True)
-        ]
+        (
+            chart.a.cell_positions(block.cells[0], LOCAL)[1],
+            chart.b.cell_positions(block.cells[1], LOCAL)[1],
+        )
         for chart, block in zip(contact.charts, contact.blocks, strict=True)
     ]
     patches, in_cells = [], []
