@@ -47,7 +47,7 @@ from mumacro.inputs.fields import (
 from mumacro.inputs.names import in_place_of, suggestion
 from mumacro.inputs.numbers import check_signs
 from mumacro.inputs.units import scale_of, split_unit
-from mumacro.kernel.arrays import Array, Places, common_shape, flat
+from mumacro.kernel.arrays import Array, Places, flat
 
 
 class Absent(enum.Enum):
@@ -638,14 +638,16 @@ def _of_all(x: float | Array, shape: tuple[int, ...]) -> float | Array:
 
 def _shape_of(columns: _Numbers, std: _Numbers) -> tuple[int, ...]:
     """Return the shape to which all columns broadcast; InputError where they do not."""
-    arrays = [x for x in (*columns.values(), *std.values()) if isinstance(x, np.ndarray)]
-    if len(arrays) < 2:
-        return arrays[0].shape if arrays else ()
+    shapes = {x.shape for x in columns.values() if isinstance(x, np.ndarray)}
+    if std:
+        shapes |= {x.shape for x in std.values() if isinstance(x, np.ndarray)}
+    if len(shapes) < 2:
+        return shapes.pop() if shapes else ()
     try:
-        return common_shape(arrays)
+        return np.broadcast_shapes(*shapes)
     except ValueError as error:
-        shapes = {name: np.shape(x) for name, x in (columns | std).items() if np.ndim(x)}
-        raise InputError("inputs", shapes, "arrays whose shapes broadcast together") from error
+        by_name = {name: np.shape(x) for name, x in (columns | std).items() if np.ndim(x)}
+        raise InputError("inputs", by_name, "arrays whose shapes broadcast together") from error
 
 
 def _missing(values: Mapping[str, Any], fields: tuple[str, ...]) -> InputError:

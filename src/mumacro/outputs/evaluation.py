@@ -112,8 +112,9 @@ def evaluate_cases(
     tabulated: Tabulated, cases: Cases, outputs: tuple[Output, ...] = (), groups: bool = False
 ) -> Answer[Any]:
     """Return the answer to cases with these outputs; ``groups`` keeps v~, y~ and l0, too."""
-    gradient = any(output.gradient for output in outputs)
-    detail: Detail = "gradient" if gradient else "groups" if outputs or groups else "values"
+    detail: Detail = "groups" if outputs or groups else "values"
+    if outputs and any(output.gradient for output in outputs):
+        detail = "gradient"
     if not cases.shape:
         return _of_one(Evaluated(tabulated, cases, detail), outputs)
     if not outputs and cases.ends is None:
