@@ -6,7 +6,8 @@ before it, every list or object a bracket.
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache, partial
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -17,10 +18,11 @@ from mumacro.answer import TEXTS, Answer, nested
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, named
 from mumacro.inputs.fields import AMPLITUDE, DIRECTIONS, ENDS, FIELDS, SPRING, field_of, kind_of
+from mumacro.inputs.names import unknown_name
 from mumacro.stopping import look
 
 from .json_text import NotRead, count, decode_batch, decode_columns, decode_rows, dump
-from .models.inputs import INPUTS, MAX_REASONS
+from .models.inputs import INPUTS, MAX_REASONS, entry
 from .models.options import Case, CaseColumns
 from .problems import FieldFault, ProblemKind, RequestError, faults_of, reason_of, refuse
 
@@ -32,6 +34,7 @@ SLICE = 8192  # cases that are computed and written at a time
 _NUMBERS = (*INPUTS, *DEVIATIONS)  # members that hold numbers
 _REST = tuple(name for name in CaseColumns.model_fields if name not in _NUMBERS)
 _KNOWN = len(CaseColumns.model_fields)  # number of names that a case or its columns may have
+_REQUIRED = frozenset(name for name, about in Case.model_fields.items() if about.is_required())
 _OPENS_LIST = re.compile(rb"[ \t\r\n]*\[")
 
 
@@ -88,61 +91,112 @@ def _check_names(columns: Mapping[str, Any], words: Mapping[str, Any]) -> None:
 
 
 def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
-    """Return rows one by one: each is checked as one case, and a bad one gets its first reason."""
+    """Return rows one by one; a bad one gets its first reason.
+
+    Whether a row is a case is found fast, once for all rows of the same names; only where it is
+    none, and is listed, the model of a case looks for the reason, which takes ten times as long.
+    """
     columns: dict[str, Any] = {name: np.full(len(rows), np.nan) for name in (*ALL_FIELDS, *ENDS)}
     columns |= {name: np.zeros(len(rows)) for name in DEVIATIONS}
     usual = {name: words.get(name, word) for name, word in SPRING.names.items()}
-    of_kind: dict[str, list[str]] = {name: [] for name in KIND if name not in words}
-    in_query = {field_of(DEVIATIONS[name])[0] for name in words.keys() & DEVIATIONS.keys()}
-    reasons: dict[int, Reason] = {}
     used = set[str]()
+    words_of: dict[str, dict[str, None]] = {name: {} for name in KIND if name not in words}
+    targets_of = lru_cache(maxsize=64)(partial(_targets_of, words))
+    reasons: dict[int, Reason] = {}
     for i, row in enumerate(rows):
         look()
-        try:
-            values = _row(row).values
-            if twice := values.keys() & words.keys():
-                raise InputError(min(twice), None, "left out: it is given in the query")
-            one = Cases.of(named(None, {**words, **values}))
-        except (ValidationError, InputError) as error:
+        if (numbers := _numbers_in(row, targets_of)) is None:
             if len(reasons) < MAX_REASONS:
-                reasons[i] = _first(error)
+                reasons[i] = _first_reason(row, words)
             continue
-        k = one.columns["k"]
-        ends: Any = one.ends or (k, k)  # a number is an interval of itself
-        filled = {**dict(zip(ENDS, ends, strict=True)), **one.columns}
-        filled |= {f"std_{name}": x for name, x in one.std.items() if name not in in_query}
-        for name, column in of_kind.items():
-            column.append(values.get(name, usual[name]))
-        for name, value in filled.items():
-            columns[name][i] = value
-        used |= {name for name in filled if name not in ENDS} | ({*ENDS} if one.ends else set())
+        for name, number in numbers.items():
+            columns[name][i] = number
+        used |= numbers.keys()
+        for name, found in words_of.items():
+            found[row.get(name) or usual[name]] = None
+    if {*ENDS} <= used:  # a number is an interval of itself
+        alone = np.isnan(columns["k_low"])
+        for name in ENDS:
+            columns[name][alone] = columns["k"][alone]
+        for i in np.flatnonzero(columns["k"] == math.inf).tolist():
+            reasons.setdefault(i, ("k", "must be finite beside rows with an interval of k"))
     normal = AMPLITUDE in used or usual["direction"] == DIRECTIONS[-1]
     fields = kind_of(direction=DIRECTIONS[-1]).fields if normal else FIELDS
     names = [name for name in fields if name != "k"] + [*(ENDS if {*ENDS} <= used else ("k",))]
-    if {*ENDS} <= used:
-        for i in np.flatnonzero(columns["k"] == math.inf).tolist():
-            reasons.setdefault(i, ("k", "must be finite beside rows with an interval of k"))
     members = {name: columns[name] for name in names}
-    members |= {name: each for name, each in of_kind.items() if {*each} - {usual[name]}}
+    members |= {name: [*found] for name, found in words_of.items() if {*found} - {usual[name]}}
     members |= {name: columns[name] for name in DEVIATIONS if name in used}
     return Body(members, reasons, True)
 
 
-def _row(row: Any) -> Case:
+#: by name of a row's member the column that it goes into, and what one unit of it is there
+_Targets = dict[str, tuple[str, float]]
+
+
+def _targets_of(
+    words: Mapping[str, Any], names: frozenset[str], contact: Any, direction: Any
+) -> _Targets | None:
+    """Return where the numbers of a row with these names go; None where the names make no case."""
+    if not (_REQUIRED <= names <= Case.model_fields.keys()) or names & words.keys():
+        return None
+    numbers = names - {*KIND}
+    case = {name: 0.5 if name == AMPLITUDE else 1.0 for name in numbers} | {**words}
+    case |= {name: x for name, x in zip(KIND, (contact, direction), strict=True) if x is not None}
+    try:
+        Cases.of(named(None, case))
+    except InputError:
+        return None
+    targets = {}
+    for name in numbers:
+        field, unit = field_of(DEVIATIONS.get(name, name))
+        targets[name] = (f"std_{field}" if name in DEVIATIONS else field), unit
+    return targets
+
+
+def _numbers_in(row: Any, targets_of: Callable[..., _Targets | None]) -> dict[str, float] | None:
+    """Return the numbers of a row by column; None where it is no case."""
     if not isinstance(row, dict):
-        raise InputError("", row, "an object")
-    return Case.model_validate(row)
+        return None
+    if None in row.values():  # left out, but for k, where it may mean rigid
+        row = {name: x for name, x in row.items() if x is not None or name == "k"}
+    try:
+        targets = targets_of(frozenset(row), row.get("contact"), row.get("direction"))
+    except TypeError:  # a list is no word
+        return None
+    if targets is None:
+        return None
+    numbers = {}
+    for name, (column, unit) in targets.items():
+        number, reason = entry(name, row[name])
+        if reason is not None:
+            return None
+        numbers[column] = unit * number
+    if "k_low" in numbers and numbers["k_low"] > numbers["k_high"]:
+        return None
+    if AMPLITUDE in numbers and numbers[AMPLITUDE] >= numbers["Fz"]:
+        return None
+    return numbers
 
 
-def _first(error: ValidationError | InputError) -> Reason:
-    """Return the first fault of a row, in the order of the inputs."""
-    if isinstance(error, InputError):
-        return (str(error.field) or None), reason_of(error)
-    faults = faults_of(error.errors(include_url=False), Case.model_fields)
-    order = list(Case.model_fields)
-    places = [(one.path[0] if one.path else "", one.reason) for one in faults]
-    name, reason = min(places, key=lambda one: order.index(one[0]) if one[0] in order else -1)
-    return str(name)[:80] or None, reason
+def _first_reason(row: Any, words: Mapping[str, Any]) -> Reason:
+    """Return the first fault of a row that is no case, in the order of the inputs."""
+    if not isinstance(row, dict):
+        return None, "must be an object"
+    if unknown := next((name for name in row if name not in Case.model_fields), None):
+        shown = unknown[:80].encode("utf-8", "replace").decode()  # half of a surrogate pair
+        return shown, unknown_name(unknown, Case.model_fields)
+    try:
+        values = Case.model_validate(row).values
+        if twice := values.keys() & words.keys():
+            raise InputError(min(twice), None, "left out: it is given in the query")
+        Cases.of(named(None, {**words, **values}))
+    except InputError as error:
+        return str(error.field) or None, reason_of(error)
+    except ValidationError as error:
+        faults = faults_of(error.errors(include_url=False), Case.model_fields)
+        first = min(faults, key=lambda fault: [*Case.model_fields].index(str(fault.path[0])))
+        return str(first.path[0]), first.reason
+    raise AssertionError(f"the row {row} is a case")
 
 
 # --- answers --------------------------------------------------------------------------------------

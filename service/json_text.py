@@ -1,14 +1,13 @@
 """JSON: the one place where texts become Python objects, and answers become texts.
 
 A question is one object in which no name is given twice.  A batch is columns or rows: orjson and
-msgspec read it fast, but no other thread runs meanwhile, so one body at a time is read so.  What
-they refuse is left to Python's ``json``: that is slow, lets other threads run, gives the reason,
-and reads NaN, Infinity and integers of any size, which are refused by their fields later.
+msgspec read it fast, but no other thread runs meanwhile.  What they refuse is left to Python's
+``json``: that is slow, lets other threads run, gives the reason, and reads NaN, Infinity and
+integers of any size, which are refused by their fields later.
 """
 
 import json
 import math
-import threading
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from functools import lru_cache, partial
@@ -29,9 +28,7 @@ from .problems import FieldFault, ProblemKind, RequestError, refuse
 _MOST_MEMBERS = 200  # members of an object of a question, at most
 #: what the fast readers raise where a text is no JSON, or has another type
 NotRead = (msgspec.MsgspecError, ValueError)
-# One at a time: a body holds up other threads for as long as it is read, and its numbers take four
-# times the memory of the arrays that they become.
-_READING = threading.Lock()
+_COUNTED = 2**18  # bytes of a text that are counted at a time, so that they stay in the cache
 
 
 # --- a question -----------------------------------------------------------------------------------
@@ -124,14 +121,13 @@ def decode_columns(text: bytearray, numbers: Collection[str], rest: Collection[s
 
     Raise one of :data:`NotRead` where a name is neither among ``numbers`` nor in ``rest``.
     """
-    with _READING:
-        found = _members(tuple(numbers), tuple(rest))(text)
-        members = {name: getattr(found, name) for name in found.__struct_fields__}
-        return {
-            name: _column(value) if isinstance(value, msgspec.Raw) else value
-            for name, value in members.items()
-            if value is not msgspec.UNSET
-        }
+    found = _members(tuple(numbers), tuple(rest))(text)
+    members = {name: getattr(found, name) for name in found.__struct_fields__}
+    return {
+        name: _column(value) if isinstance(value, msgspec.Raw) else value
+        for name, value in members.items()
+        if value is not msgspec.UNSET
+    }
 
 
 def _column(value: msgspec.Raw) -> Any:
@@ -159,24 +155,24 @@ def decode_rows(
     Raise one of :data:`NotRead` unless all rows have the names of the first one, which are among
     ``numbers`` and ``words``, and values of these types.
     """
-    with _READING:
-        names = _first_names(text)
-        if not {*names} <= {*numbers, *words}:
-            raise ValueError("an unknown name")
-        numbers = [name for name in names if name in numbers]
-        rows = _rows(names, tuple(numbers))(text)
-        all_numbers = len(numbers) == len(names)
-        values_of = msgspec.structs.astuple if all_numbers else attrgetter(*numbers)
-        size = len(rows) * len(numbers)
-        try:
-            table = np.fromiter(chain.from_iterable(map(values_of, rows)), np.float64, size)
-        except ValueError:  # the word rigid
-            values = chain.from_iterable(map(values_of, rows))
-            infinite = (math.inf if value == RIGID else value for value in values)
-            table = np.fromiter(infinite, np.float64, size)
-        columns: Array = np.ascontiguousarray(table.reshape(len(rows), -1).T)
-        listed = {name: [*map(attrgetter(name), rows)] for name in names if name in words}
-        return dict(zip(numbers, columns, strict=True)) | listed
+    names = _first_names(text)
+    if not {*names} <= {*numbers, *words}:
+        raise ValueError("an unknown name")
+    numbers = [name for name in names if name in numbers]
+    rows = _rows(names, tuple(numbers))(text)
+    all_numbers = len(numbers) == len(names)
+    values_of = msgspec.structs.astuple if all_numbers else attrgetter(*numbers)
+    size = len(rows) * len(numbers)
+    try:
+        table = np.fromiter(chain.from_iterable(map(values_of, rows)), np.float64, size)
+    except ValueError:  # the word rigid
+        values = chain.from_iterable(map(values_of, rows))
+        infinite = (math.inf if value == RIGID else value for value in values)
+        table = np.fromiter(infinite, np.float64, size)
+    listed = {name: [*map(attrgetter(name), rows)] for name in names if name in words}
+    del rows  # before there is a second array: they take four times the memory of the first one
+    columns: Array = np.ascontiguousarray(table.reshape(-1, len(numbers)).T)
+    return dict(zip(numbers, columns, strict=True)) | listed
 
 
 def _first_names(text: bytearray) -> tuple[str, ...]:
@@ -201,8 +197,9 @@ def _rows(names: tuple[str, ...], numbers: tuple[str, ...]) -> Callable[[bytearr
 def count(text: bytes | bytearray, character: bytes) -> int:
     """Return how often a character stands in a text; ``text.count`` takes longer where it often
     does."""
-    codes = np.frombuffer(text, np.uint8)
-    return int(np.count_nonzero(codes == character[0]))
+    codes, code = np.frombuffer(text, np.uint8), character[0]
+    starts = range(0, codes.size, _COUNTED)
+    return sum(int(np.count_nonzero(codes[i : i + _COUNTED] == code)) for i in starts)
 
 
 # --- answers --------------------------------------------------------------------------------------

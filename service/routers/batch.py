@@ -2,10 +2,13 @@
 form.
 
 A body is read whole, evaluated and answered in slices.  What is not small is read and computed in
-threads, with a slot that is kept until the last piece is sent.
+threads, with a slot that is kept until the last piece is sent.  These read one body at a time: it
+takes several times the memory of the arrays that it becomes, and since Python runs one thread at a
+time, several would be no faster and keep the loop waiting longer.
 """
 
 import math
+import threading
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Annotated, Any, TypeVar
@@ -14,8 +17,9 @@ from fastapi import Query, Request, Response
 from starlette.types import Receive, Scope, Send
 
 from mumacro.inputs.cases import KIND
+from mumacro.stopping import look
 
-from ..admission import AT_ONCE, ticket_of
+from ..admission import AT_ONCE, LONG, ticket_of
 from ..batch import Batch
 from ..forms import MORE_CASES, read
 from ..json_text import count
@@ -30,7 +34,11 @@ T = TypeVar("T")
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _BYTES_PER_UNIT = 16  # bytes of a body whose reading has the cost 1, see service/admission.py
 # costs of reading a row, and a text or a null, where Python reads them one by one
-_ROW, _WORD = 400.0, 160.0
+_ROW, _WORD = 400.0, 40.0
+_READS = threading.Lock()
+_LOOK_EVERY_S = (
+    0.05  # seconds between two looks of a thread that waits to read whether it is to end
+)
 
 
 class _Answer(Response):
@@ -74,7 +82,9 @@ class _Answer(Response):
         # Reading costs by the byte, computing by the case: a small body can request much
         # computation.
         cost = len(text) / _BYTES_PER_UNIT
-        batch = await run(partial(self._batch, text), cost + _by_one(text))
+        of_reading = cost if cost > LONG else cost + _by_one(text)
+        read_it = self._batch if of_reading <= AT_ONCE else self._batch_in_turn
+        batch = await run(partial(read_it, text), of_reading)
         ticket_of(self._scope).hold(0)  # the text is gone
         cost += batch.cost
         pieces = _gathered(batch.write(), self._piece)
@@ -88,6 +98,14 @@ class _Answer(Response):
             piece, following = following, await run(lambda: next(pieces, None), cost)
         ticket_of(self._scope).leave()
         await give(piece, more=False)
+
+    def _batch_in_turn(self, text: bytearray) -> Batch:
+        while not _READS.acquire(timeout=_LOOK_EVERY_S):
+            look()
+        try:
+            return self._batch(text)
+        finally:
+            _READS.release()
 
     def _batch(self, text: bytearray) -> Batch:
         state, options = self._state, self._options

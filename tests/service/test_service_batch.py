@@ -3,6 +3,7 @@
 import json
 import math
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mumacro import Surrogate
+from service import forms
 from tests.support.cases import Case
 
 BATCH = "/v1/mu-macro/batch"
@@ -255,6 +257,10 @@ OTHERS = st.sampled_from(
             {"v0": -1.0},
             {"f": 10**400},
             {"Fz_amplitude": 3.0},
+            {"omega": 1e5},
+            {"y0": True},
+            {"contact": "cube"},
+            {"contact": "ball", "direction": "normal"},
         )
     ]
 )
@@ -265,6 +271,16 @@ CASES: st.SearchStrategy[list[Any]] = st.sampled_from(
         (STIFFNESSES | OTHERS).map(lambda more: case | more), min_size=1, max_size=5
     )
 )
+
+
+def test_a_reason_is_looked_for_once_in_each_row_that_is_listed(client: Any) -> None:
+    """To find a reason takes ten times as long as to find that there is one."""
+    strange = {f"name{i}": 1 for i in range(12)}
+    for row, function in (({}, "faults_of"), ({**SPRING, **strange}, "unknown_name")):
+        with patch.object(forms, function, wraps=getattr(forms, function)) as looked:
+            answer = client.post(BATCH, json=[row] * 1500).json()
+        assert (answer["n_errors"], len(answer["errors"])) == (1500, 1000)
+        assert looked.call_count == 1000
 
 
 BESIDE_AN_INTERVAL = ("k", "must be finite beside rows with an interval of k")
