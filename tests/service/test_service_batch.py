@@ -286,7 +286,7 @@ def test_a_reason_is_looked_for_once_in_each_row_that_is_listed(client: Any) -> 
 BESIDE_AN_INTERVAL = ("k", "must be finite beside rows with an interval of k")
 
 
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)
 @given(rows=CASES)
 def test_rows_are_answered_and_refused_like_each_of_them_alone(client: Any, rows: Any) -> None:
     answer = client.post(BATCH, json=rows).json()
