@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 
 from mumacro.errors import InputError, MumacroError, missing
 from mumacro.inputs.fields import AMPLITUDE, RAD_PER_CYCLE
-from mumacro.inputs.units import suit_unit, unit_of
+from mumacro.inputs.units import format_number, suit_unit, tidy_zeros, unit_of
 from mumacro.kernel.arrays import Array
-from mumacro.results import format_number, tidy_zeros
 
 ENDINGS = (".png", ".svg", ".pdf")
 #: the map: v~ from deep in creep to fast sliding [-], and y~ [-]; that of a normal force is below
@@ -223,8 +222,8 @@ def oscillation_words(symbol: str, unit: str, terms: Iterable[tuple[int, float, 
         order = "" if harmonic == 1 else f"{harmonic}{ending} harmonic "
         # whole turns say nothing
         phase = math.remainder(degrees, 360.0)
-        at = f" at {phase:.4g}°" if abs(phase) > 1e-9 else ""
-        parts.append(f"{order}{_in_suited_unit(unit, amplitude)}{at}")
+        behind = f" at {phase:.4g}°" if abs(phase) > 1e-9 else ""
+        parts.append(f"{order}{_in_suited_unit(unit, amplitude)}{behind}")
     return f"{symbol}: {', '.join(parts)}" if parts else ""
 
 
@@ -465,10 +464,10 @@ def heights(ratio: Array, level: float) -> Array:
     everywhere."""
     below = ratio < level
     first = np.where(below.any(axis=0), below.argmax(axis=0), len(ratio))
-    at = np.clip(first, 1, len(ratio) - 1)
-    over, under = (np.take_along_axis(ratio, i[None, :], axis=0)[0] for i in (at - 1, at))
+    row = np.clip(first, 1, len(ratio) - 1)
+    over, under = (np.take_along_axis(ratio, i[None, :], axis=0)[0] for i in (row - 1, row))
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = (at - 1 + (over - level) / (over - under)) / (len(ratio) - 1)
+        share = (row - 1 + (over - level) / (over - under)) / (len(ratio) - 1)
     return np.where(first == 0, 0.0, np.where(first == len(ratio), 1.0, share))
 
 
@@ -491,11 +490,12 @@ def label_places(ratio: Array, border: Array) -> list[tuple[float, float, float]
         if not inside.any():
             continue
         x, y = across[inside], lines[level][inside]
-        others = [line for other, line in lines.items() if other != level]
-        apart = np.min([_distances(x, y, across, line) for line in others], axis=0)
+        apart = np.min(
+            [_distances(x, y, across, line) for i, line in lines.items() if i != level], axis=0
+        )
         # the border is drawn thicker than a line, and a number beside it is hard to read
         apart = np.minimum(apart, _TO_BORDER * _distances(x, y, across, border))
-        for u, w in [*words, *(at[1:] for at in places)]:
+        for u, w in [*words, *(label[1:] for label in places)]:
             apart = np.minimum(apart, 0.5 * np.hypot(x - u, y - w))
         best = int(apart.argmax())
         places.append((level, float(x[best]), float(y[best])))
@@ -627,8 +627,10 @@ def _mark(ax: Any, marks: Marks, normal: bool, halo: Any) -> None:
         looks = {"ms": 2.0, "mew": 0.0, "rasterized": True}
     if marks.ends is not None and count <= _MOST_RANGES:
         for i in range(count):
-            at = np.geomspace(marks.ends[0][i], marks.ends[1][i], 50)
-            path = on_map(at * marks.v[i], at * marks.y[i], np.full(50, marks.ray[i]), normal)
+            shares = np.geomspace(marks.ends[0][i], marks.ends[1][i], 50)
+            path = on_map(
+                shares * marks.v[i], shares * marks.y[i], np.full(50, marks.ray[i]), normal
+            )
             label = None if i else "the interval of $k$"
             ax.plot(*path, color=INK, lw=4.0, alpha=0.45, solid_capstyle="round", label=label)
     for name, look in REGIMES.items():
@@ -646,15 +648,16 @@ def _mark(ax: Any, marks: Marks, normal: bool, halo: Any) -> None:
             )
     words = np.asarray(marks.words, object)
     for word in dict.fromkeys(words[words != ""].tolist()):
-        at = np.flatnonzero(words == word)
-        number = f" ({at.size} cases)" if at.size > 1 else ""
-        across = np.log(v[at[0]] / V_RANGE[0]) / np.log(V_RANGE[1] / V_RANGE[0])
+        which = np.flatnonzero(words == word)
+        number = f" ({which.size} cases)" if which.size > 1 else ""
+        first = int(which[0])
+        across = np.log(v[first] / V_RANGE[0]) / np.log(V_RANGE[1] / V_RANGE[0])
         right = bool(across > 0.5)
         _, middle = place(0.5, 0.5, normal)
-        above = bool(y[at[0]] > middle)
+        above = bool(y[first] > middle)
         ax.annotate(
             word + number,
-            (v[at[0]], y[at[0]]),
+            (v[first], y[first]),
             (-10.0 if right else 10.0, -12.0 if above else 12.0),
             textcoords="offset points",
             ha="right" if right else "left",
@@ -729,15 +732,15 @@ def _draw_path(path: Any, x: Array, y: Array, Fx: Array, Fy: Array) -> None:
     x, y = x * scale.over / scale.times, y * scale.over / scale.times
     path.plot(x, y, color=_ink(), label="upper point")
     path.plot(x[0], y[0], "o", color="C0", label="start of the period")
-    at = np.linspace(0, x.size - 1, _ARROWS + 1).astype(int)[:-1]
+    moments = np.linspace(0, x.size - 1, _ARROWS + 1).astype(int)[:-1]
     # the longest arrow is a fifth of the path's extent
     length = 0.2 * max(np.ptp(x), np.ptp(y)) / max(float(np.hypot(Fx, Fy).max()), 1e-300)
-    tips = np.stack([x[at] + length * Fx[at], y[at] + length * Fy[at]], axis=1)
+    tips = np.stack([x[moments] + length * Fx[moments], y[moments] + length * Fy[moments]], axis=1)
     path.quiver(
-        x[at],
-        y[at],
-        length * Fx[at],
-        length * Fy[at],
+        x[moments],
+        y[moments],
+        length * Fx[moments],
+        length * Fy[moments],
         angles="xy",
         scale_units="xy",
         scale=1.0,

@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mumacro.errors import MumacroError
-from mumacro.inputs.fields import quantity_of
-from mumacro.inputs.units import Unit, parse_unit, suit_unit, unit_of
 from mumacro.notes import REMARK, WARNING, Note, Remark, texts_of
 
 Rows = list[tuple[str, ...]]  # of texts, as a table shows them
@@ -156,77 +154,6 @@ def frame_of(columns: Mapping[str, Any]) -> Any:
             for name, x in columns.items()
         }
     )
-
-
-def known(value: float, digits: int, error: float = 0.0, deviation: float = 0.0) -> str:
-    """Return a number with ``digits`` digits, less those that are not known: none is below the
-    first digit of its ``error``, or the second of its ``deviation``.
-
-    >>> known(0.24046650645751835, 6), known(0.24046650645751835, 6, deviation=0.0136)
-    ('0.240467', '0.240')
-    >>> known(-3.7e-10, 6, error=2e-7), known(0.2, 6, error=8e-3)
-    ('0', '0.200')
-    """
-    if value == 0.0 or not math.isfinite(value):
-        return f"{value:g}"
-    places = digits - 1 - math.floor(math.log10(abs(value)))
-    if 0.0 < error < math.inf:
-        places = min(places, -math.floor(math.log10(error)))
-    if 0.0 < deviation < math.inf:
-        places = min(places, 1 - math.floor(math.log10(deviation)))
-    rounded = round(value, places)
-    if rounded == 0.0:
-        return "0"
-    count = max(places + 1 + math.floor(math.log10(abs(rounded))), 1)
-    return f"{rounded:#.{count}g}".removesuffix(".")
-
-
-def choose_unit(
-    name: str, value: float, typed: Mapping[str, str], digits: int | None = None
-) -> Unit:
-    """Return the unit in which an input is shown: the one that was typed, or the one that suits a
-    value [SI]; with a number of ``digits``, the SI unit.
-
-    >>> choose_unit("y0", 2e-6, {}).symbol, choose_unit("y0", 2e-6, {"y0": "mm"}).symbol
-    ('um', 'mm')
-    """
-    if digits is not None:
-        return Unit(unit_of(name))
-    parsed = parse_unit(quantity_of(name), typed[name]) if name in typed else None
-    return parsed or suit_unit(unit_of(name), value)
-
-
-def format_number(
-    value: float, unit: Unit, count: int, digits: int | None = None, error: float = 0.0
-) -> str:
-    """Return a value [SI] as a number of a unit, with ``count`` digits, less those that its
-    ``error`` leaves unknown; or with ``digits``."""
-    if digits is not None:
-        return f"{value:.{digits}g}"
-    return known(unit.scale.of_si(value), count, unit.scale.of_si(error))
-
-
-def format_quantity(value: float, unit: Unit, count: int, digits: int | None = None) -> str:
-    """Return the same with the unit.
-
-    >>> format_quantity(2.4547623e-6, suit_unit("m", 2.4547623e-6), 4)
-    '2.455 um'
-    >>> format_quantity(2.4547623e-6, Unit("m"), 4, digits=8)
-    '2.4547623e-06 m'
-    """
-    return f"{format_number(value, unit, count, digits)} {unit.symbol}"
-
-
-def tidy_zeros(text: str) -> str:
-    """Return a number without zeros at its end.
-
-    >>> [tidy_zeros(text) for text in ("2.500", "100", "1.0e-07", "2.0")]
-    ['2.5', '100', '1e-07', '2']
-    """
-    mantissa, e, exponent = text.partition("e")
-    if "." in mantissa:
-        mantissa = mantissa.rstrip("0").rstrip(".")
-    return f"{mantissa}{e}{exponent}"
 
 
 def cell(value: Any) -> str:

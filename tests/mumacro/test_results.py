@@ -14,8 +14,9 @@ import pytest
 import mumacro
 from mumacro import InputError, Surrogate
 from mumacro.cli.main import main
+from mumacro.inputs.units import known
 from mumacro.outputs import OUTPUTS
-from mumacro.results import Result, known
+from mumacro.results import Result
 from tests.support.cases import Case
 from tests.support.comparing import close
 

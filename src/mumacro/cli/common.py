@@ -36,11 +36,11 @@ from mumacro.inputs.fields import (
 )
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.numbers import check_signs
-from mumacro.inputs.units import belongs_to_value, unit_of
+from mumacro.inputs.units import belongs_to_value, choose_unit, format_number, tidy_zeros, unit_of
 from mumacro.notes import Note
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import names_in
-from mumacro.results import choose_unit, format_number, listed, tidy_zeros
+from mumacro.results import listed
 from mumacro.surrogate import Surrogate
 
 ABOUT_INPUTS = f"""\
@@ -375,14 +375,14 @@ def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
     return {name: float(x) if isinstance(x, np.ndarray) else x for name, x in one_k.items()}
 
 
-def typed_units(words: Sequence[str], **more: Sequence[str]) -> dict[str, str]:
-    """Return the units that were typed, by input; ``more`` are other texts of an input, such as the
-    ends of a range, which come first.
+def typed_units(words: Sequence[str], **texts_of: Sequence[str]) -> dict[str, str]:
+    """Return the units that were typed, by input; ``texts_of`` an input are others of it, such as
+    the ends of a range, which come first.
 
     >>> typed_units(["mu0=0.3 Fz=10N", "k=1 N/um v0=1mm/s"], v0=["0.1m/s", "1"])
     {'v0': 'm/s', 'Fz': 'N', 'k': 'N/um'}
     """
-    pairs = [(name, text) for name, texts in more.items() for text in texts]
+    pairs = [(name, text) for name, texts in texts_of.items() for text in texts]
     pairs += [(name, text) for name, text in _pairs(words) if text is not None]
     units: dict[str, str] = {}
     for name, text in pairs:
@@ -391,8 +391,11 @@ def typed_units(words: Sequence[str], **more: Sequence[str]) -> dict[str, str]:
     return units
 
 
-def case_line(case: Mapping[str, Any], units: Mapping[str, str], kind: Kind, *more: str) -> str:
-    """Return the case that was understood, in the units that were typed, and ``more`` of it."""
+def case_line(
+    case: Mapping[str, Any], units: Mapping[str, str], kind: Kind, *oscillations: str
+) -> str:
+    """Return the case that was understood, in the units that were typed, and its
+    ``oscillations``."""
     parts = []
     for name, value in case.items():
         if name.startswith("std_") or name == ENDS[1]:
@@ -407,7 +410,7 @@ def case_line(case: Mapping[str, Any], units: Mapping[str, str], kind: Kind, *mo
         shown = [tidy_zeros(format_number(float(x), unit, 6)) for x in (*ends, *deviation)]
         numbers = (" ± " if deviation else " to ").join(shown)
         parts.append(f"{field} = {numbers} {unit.symbol}".removesuffix(" -"))
-    return "; ".join([", ".join([*parts, *more]), ", ".join(kind.names.values())])
+    return "; ".join([", ".join([*parts, *oscillations]), ", ".join(kind.names.values())])
 
 
 def number_of(name: str, advice: str = "") -> Callable[[str], float]:

@@ -60,7 +60,7 @@ def _parser() -> OneLineParser:
 def run(words: Sequence[str]) -> str:
     """Run ``mumacro fit``."""
     options = _parser().parse_intermixed_args(words)
-    unknown, more = (
+    unknown, pairs = (
         [x for x in options.unknown or () if ("=" in x) == has_value] for has_value in (False, True)
     )
     if wrong := [name for name in unknown if name not in UNKNOWNS]:
@@ -75,7 +75,7 @@ def run(words: Sequence[str]) -> str:
     unknown = unknown or unknowns_beside(points)
     in_table = [name for name in points if name in kind.columns]
     case = common.read_case(
-        [*options.words, *more],
+        [*options.words, *pairs],
         kind,
         [*unknown, *in_table],
         one_k="one k is needed; or leave it out, and it is fitted",

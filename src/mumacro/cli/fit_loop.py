@@ -70,8 +70,8 @@ def run(words: Sequence[str]) -> str:
     if len({*names.values()}) < len(names):
         raise UsageError(f"{', '.join(names.values())}: each column has one meaning")
     load = _load(options.words, options.load)
-    like = {name: "y0" if what == "displacement" else "Fz" for what, name in names.items()}
-    column_names = ColumnNames(like, [(name,) for name in names.values()])
+    input_of = {name: "y0" if what == "displacement" else "Fz" for what, name in names.items()}
+    column_names = ColumnNames(input_of, [(name,) for name in names.values()])
     source = sys.stdin.buffer.read() if options.loop == "-" else Path(options.loop)
     try:
         table = read_numbers(source, column_names, dialect_in(options))

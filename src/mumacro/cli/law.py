@@ -15,9 +15,16 @@ from mumacro.cli.common import (
     read_case,
 )
 from mumacro.inputs.case import read_one
-from mumacro.inputs.units import Unit, unit_of
+from mumacro.inputs.units import (
+    Unit,
+    choose_unit,
+    format_number,
+    format_quantity,
+    known,
+    tidy_zeros,
+    unit_of,
+)
 from mumacro.questions.law import law as friction_law
-from mumacro.results import choose_unit, format_number, format_quantity, known, tidy_zeros
 
 EXAMPLE = 'mumacro law "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz" --along v0 0.1mm/s 1m/s'
 

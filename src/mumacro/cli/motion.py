@@ -3,16 +3,16 @@
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from mumacro import plotting
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns, read_case
-from mumacro.inputs.fields import CONTACTS, in_help
-from mumacro.inputs.units import Unit, suit_unit
+from mumacro.inputs.fields import CONTACTS, in_help, kind_of
+from mumacro.inputs.units import Unit, format_number, suit_unit
 from mumacro.motions.motion import NUMBERS, PARTS, Motion
 from mumacro.motions.motion import motion as steady_cycle
 from mumacro.motions.oscillation import read_oscillation
-from mumacro.results import format_number
 
 EXAMPLE = 'mumacro motion "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=1cm/s" --x 1um@90deg --y 2um'
 _INPUTS = f"""\
@@ -38,8 +38,28 @@ def add_parts(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(f"--{name}", metavar="A[@PHASE]", help=text)
 
 
-def run(words: Sequence[str]) -> str:
-    """Run ``mumacro motion``."""
+def read_motion(
+    options: argparse.Namespace, optional: Sequence[str] = ()
+) -> tuple[dict[str, Any], dict[str, Any], str]:
+    """Return the case and the oscillations that were typed, as keywords of
+    :func:`mumacro.motion`, and a line that says how both were understood.
+
+    ``optional`` are inputs of the case that may be left out.
+    """
+    why = "one motion has one k; ask for both ends"
+    case = read_case(options.words, one_k=why, optional=["y0", *optional])
+    if "y0" in case:
+        raise UsageError("y0 is an option here: --y for across, --x for along the drag")
+    texts = {name: text for name in PARTS if (text := getattr(options, name)) is not None}
+    parts = dict(zip(texts, common.read_values(texts.items(), read_oscillation), strict=True))
+    oscillations = [f"{name} = {text}" for name, text in texts.items()]
+    units, kind = common.typed_units(options.words), kind_of(options.contact)
+    line = common.case_line(case, units, kind, *oscillations)
+    return case, parts, line.removesuffix(", across")
+
+
+def _parser() -> OneLineParser:
+    """Return the arguments of the command."""
     parser = OneLineParser(
         prog="mumacro motion",
         description="Mean friction and steady cycle of a contact that is dragged along x and "
@@ -54,20 +74,14 @@ def run(words: Sequence[str]) -> str:
     text = "write the cycle there: a picture, .png, .svg or .pdf, or .csv"
     parser.add_argument("-o", "--out", type=Path, help=text)
     common.add_form(parser)
-    options = parser.parse_intermixed_args(words)
-    case = read_case(
-        options.words, one_k="one motion has one k; ask for both ends", optional=["y0"]
-    )
-    if "y0" in case:
-        raise UsageError("y0 is an option here: --y for across, --x for along the drag")
-    texts = [(name, text) for name in PARTS if (text := getattr(options, name)) is not None]
-    parts = common.read_values(texts, read_oscillation)
-    motion = steady_cycle(
-        **case,
-        **dict(zip((name for name, _ in texts), parts, strict=True)),
-        contact=options.contact,
-        tolerance=options.tolerance,
-    )
+    return parser
+
+
+def run(words: Sequence[str]) -> str:
+    """Run ``mumacro motion``."""
+    options = _parser().parse_intermixed_args(words)
+    case, parts, line = read_motion(options)
+    motion = steady_cycle(**case, **parts, contact=options.contact, tolerance=options.tolerance)
     if options.json:
         lines = as_json(motion.to_dict())
     else:
@@ -78,7 +92,7 @@ def run(words: Sequence[str]) -> str:
         ]
         error = f"numerical error of both about {motion.error_estimate:.1e}"
         notes = [note.line for note in motion.notes]
-        lines = "\n".join([in_columns(rows), error, *notes])
+        lines = "\n".join([line, in_columns(rows), error, *notes])
     if options.out is None:
         return lines
     columns = {}

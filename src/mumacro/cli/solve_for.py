@@ -19,10 +19,9 @@ from mumacro.cli.common import (
 from mumacro.inputs.case import read_one
 from mumacro.inputs.fields import AMPLITUDE, ENDS, NAMES
 from mumacro.inputs.names import suggestion
-from mumacro.inputs.units import Unit
+from mumacro.inputs.units import Unit, choose_unit, format_number, tidy_zeros
 from mumacro.motions.solve_motion import UNKNOWNS
 from mumacro.questions.solve_for import Root, TableSolution, solve_for
-from mumacro.results import choose_unit, format_number, tidy_zeros
 
 EXAMPLE = 'mumacro solve-for y0 "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s" --target 0.15'
 _TARGET = ": give mu_macro, such as 0.15 or 15%, or with --ratio mu_macro/mu0"

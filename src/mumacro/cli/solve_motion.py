@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mumacro.cli import common
-from mumacro.cli.common import ImpossibleError, UsageError, as_json, in_columns, read_case
+from mumacro.cli.common import ImpossibleError, UsageError, as_json, in_columns
+from mumacro.cli.motion import read_motion
 from mumacro.inputs.case import read
-from mumacro.inputs.fields import kind_of, quantity_of
-from mumacro.inputs.units import Unit, parse_unit, suit_unit
+from mumacro.inputs.fields import quantity_of
+from mumacro.inputs.units import Unit, format_number, known, parse_unit, suit_unit, tidy_zeros
 from mumacro.motions.motion import PARTS
-from mumacro.motions.oscillation import read_oscillation
 from mumacro.motions.solve_motion import MotionSolution, solve_motion
-from mumacro.results import format_number, known, tidy_zeros
 
 EXAMPLE = 'mumacro solve-for v0 "mu0=0.3 Fz=10N k=0.1N/um f=50Hz" --x 0.1mm --normal 8N@-90deg'
 
@@ -27,17 +26,10 @@ def run(options: argparse.Namespace, within: list[str] | None) -> str:
     """Return the roots over a motion, as text, JSON, a picture or CSV."""
     if options.direction != "across":
         raise UsageError("--direction is left out beside --x, --y and --normal, which say it")
-    texts = [(name, text) for name in PARTS if (text := getattr(options, name)) is not None]
-    parts = common.read_values(texts, read_oscillation)
-    motion = dict(zip((name for name, _ in texts), parts, strict=True))
-    optional = ["y0", *([] if "." in options.unknown else [options.unknown])]
+    optional = [] if "." in options.unknown else [options.unknown]
     if options.unknown == "f":
         optional.append("omega")
-    case = read_case(
-        options.words, one_k="one motion has one k; ask for both ends", optional=optional
-    )
-    if "y0" in case:
-        raise UsageError("y0 is an option here: --y for across, --x for along the drag")
+    case, parts, line = read_motion(options, optional)
     target = options.target
     if options.ratio:
         if "mu0" not in case:
@@ -49,7 +41,7 @@ def run(options: argparse.Namespace, within: list[str] | None) -> str:
         within=None if within is None else (within[0], within[1]),
         contact=options.contact,
         **case,
-        **motion,
+        **parts,
     )
     (roots,) = solution.roots
     if not roots:
@@ -72,11 +64,8 @@ def run(options: argparse.Namespace, within: list[str] | None) -> str:
             else tidy_zeros(known(root.mean, 6, root.error_estimate))
         )
         table.append([*cells, mean])
-    oscillations = [f"{name} = {text}" for name, text in texts]
-    units = common.typed_units(options.words)
-    first = common.case_line(case, units, kind_of(options.contact), *oscillations)
     said = filter(None, [solution.reason()])
-    return "\n".join([first.removesuffix(", across"), in_columns(table), *said])
+    return "\n".join([line, in_columns(table), *said])
 
 
 def _unit_of_roots(solution: MotionSolution, typed: Sequence[str], digits: int | None) -> Unit:

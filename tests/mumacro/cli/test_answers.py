@@ -206,6 +206,10 @@ FIRST = "mu0 = 0.3, Fz = 10 N, k = 1 N/um, y0 = 2 um, f = 20 kHz; spring, across
             ("solve-for", "v0", CONVEYOR, *PARTS, "--target", "0"),
             "mu0 = 0.3, Fz = 10 N, k = 0.1 N/um, f = 50 Hz, x = 0.1mm, normal = 8N@-90deg; spring",
         ),
+        (
+            ("motion", words("y0"), "--y", "2um", "--contact", "ball"),
+            "mu0 = 0.3, Fz = 10 N, k = 1 N/um, f = 20 kHz, v0 = 10 mm/s, y = 2um; ball",
+        ),
     ],
 )
 def test_the_case_comes_first_in_the_units_that_were_typed(
