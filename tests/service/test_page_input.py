@@ -69,7 +69,7 @@ def test_a_deviation_stands_beside_the_number(open_page: Any, surrogate: Surroga
     # one that is not small is doubted, and its origin still told
     page.type("#field-Fz", "5 ± 6 N")
     doubts = [page.text("#advice"), *page.texts("#rows .doubt")]
-    assert any("Standard deviation:" in text for text in doubts)
+    assert any("Standard deviation." in text for text in doubts)
     assert any("variance" in text and "Fz" in text for text in page.texts("#rows li"))
     bar, law = (page.find(f"#law {part}").rect for part in (".deviation", ".axis .domain"))
     assert bar["y"] + bar["height"] <= law["y"] + 2  # not below 0
@@ -592,7 +592,7 @@ def test_what_has_no_number_has_no_copy_but_its_link(open_page: Any) -> None:
     page.type("#field-mu0", "wet")
     for row in rows:
         assert page.texts(f"#{row}-row :disabled") == ["curl", "Python", "Command"]
-        assert page.value(f"#{row}-text").startswith("Not available: ")
+        assert page.value(f"#{row}-text").startswith("Not available. ")
         assert "µ₀" in page.value(f"#{row}-text")
     page.click("[data-copy=link]")
     assert "mu0=wet" in page.value("#copy-text")

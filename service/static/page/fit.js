@@ -7,7 +7,7 @@ import { html, nothing, render } from "../lib/lit-html.js";
 import { Plot } from "./plot.js";
 import { post } from "./service.js";
 import { exactCase } from "./state.js";
-import { about, inPrint, inUnit, prose, show, toSI, toUnit, unitFor } from "./words.js";
+import { about, inPrint, inUnit, prose, show, toSI, toUnit, unitFor, whole } from "./words.js";
 
 const { area } = d3;
 
@@ -171,7 +171,7 @@ export function fitPanel(store, moved, openCase) {
         ><button class="use" aria-label=${`Use ${words}`} @click=${use(one)}>Use</button>
       </li>`;
     return [
-      line(best.join("; "), values),
+      line(whole(best.join("; ")), values),
       ...solutions
         .slice(1)
         .map((other) =>
@@ -203,7 +203,7 @@ export function fitPanel(store, moved, openCase) {
       ? `; lines that were skipped: ${skipped.slice(0, 8).join(", ")}` +
         (skipped.length > 8 ? ", …" : "")
       : "";
-    return html`<p class="hint">${how ? `Read as: ${how}; ` : ""}${count} points${more}.</p>
+    return html`<p class="hint">${how ? `Recognised: ${how}; ` : ""}${count} points${more}.</p>
       <div class="scroll">
         <table>
           <thead>

@@ -11,6 +11,7 @@ import {
   inPrint,
   inUnit,
   inWords,
+  middleOf,
   numberOf,
   show,
   toSI,
@@ -209,7 +210,10 @@ export function lawPanel(store, moved) {
     if (!place || !plot.box || !plot.holds(place)) {
       const one = numberOf(answer?.inputs[law.along]);
       const words =
-        one === undefined ? "" : `Your case: ${text(one)}, µ = ${friction(answer.mu_macro, 4)}`;
+        one === undefined
+          ? ""
+          : `${middleOf(answer) && law.along !== "k" ? `At ${middleOf(answer)}` : "Your case"}: ` +
+            `${text(one)}, µ = ${friction(answer.mu_macro, 4)}`;
       write("law-read", whole(words));
       return;
     }

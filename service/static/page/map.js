@@ -5,12 +5,12 @@ import { $, attribute, write } from "./dom.js";
 import { caseOf, inputsOf } from "./state.js";
 import { Plot } from "./plot.js";
 import { get } from "./service.js";
-import { about, inPrint, inWords, show, toUnit, unitAt, whole } from "./words.js";
+import { about, inPrint, inWords, middleOf, show, toUnit, unitAt, whole } from "./words.js";
 
 const { contours } = d3;
 
 const DIGITS = 27; // pixels of a number of the legend
-const SIDES = 114; // pixels beside the map, with the numbers of its axes
+const SIDES = 118; // pixels beside the map, with the numbers of its axes
 
 /** The relative deviation of a product of powers of inputs; 0 where none has one. */
 function deviationOf(inputs, names) {
@@ -176,8 +176,10 @@ export function mapPanel(store, moved, loaded) {
     const at = place && plot.holds(place) ? place : null;
     if (!at) {
       const { v_tilde: v, y_tilde: y } = answer?.groups ?? {};
+      const middle = answer ? middleOf(answer) : "";
+      const whose = middle ? `At ${middle}` : "Your case";
       const words = answer?.groups
-        ? `Your case: ṽ = ${show(v ?? Infinity)}, ỹ = ${show(y ?? Infinity)}, ` +
+        ? `${whose}: ṽ = ${show(v ?? Infinity)}, ỹ = ${show(y ?? Infinity)}, ` +
           `µ/µ₀ = ${show(answer.mu_ratio)}`
         : "";
       const line = target ? `Dash-dotted line: µ/µ₀ = ${show(target)}.` : "";

@@ -145,7 +145,11 @@ export function motionPanel(store, moved) {
       Math.abs(one) <= error ? "0" : friction(one, Math.min(digitsWithin(one, error), most));
     const force = Math.abs(mu) <= error ? 0 : mu * inputs.Fz.value;
     list("motion-values", [
-      ["µ", "mean force along the drag, over Fz", known(mu)],
+      [
+        "µ",
+        "mean force along the drag, over Fz; below 0 the motion drives the body along",
+        known(mu),
+      ],
       ["drag force", "mean force along the drag: µ Fz", prefixed(force, "N")],
       ["µ across", "mean force across it, over Fz", known(motion.mu_lateral)],
       ["sticks", "share of the period", `${show(100 * motion.stick_fraction)} %`],
@@ -297,7 +301,7 @@ export function motionPanel(store, moved) {
     const half =
       0.55 * Math.max(...[along, across].map((one) => Math.max(...one) - Math.min(...one)), 1e-9);
     const middle = (one) => (Math.max(...one) + Math.min(...one)) / 2;
-    const ratio = Math.max(path.width - 76, 1) / Math.max(path.height - 42 - HEAD, 1);
+    const ratio = Math.max(path.width - 80, 1) / Math.max(path.height - 42 - HEAD, 1);
     const [wide, tall] = ratio > 1 ? [half * ratio, half] : [half, half / ratio];
     path.axes({
       x: {
@@ -308,7 +312,7 @@ export function motionPanel(store, moved) {
       y: { domain: [middle(across) - tall, middle(across) + tall], log: false, title: "y [µm]" },
       top: HEAD,
     });
-    headed(path, "Way of the body");
+    headed(path, "Path of the body");
     path.path(
       along.map((x, i) => [x, across[i]]),
       "curve",

@@ -2,6 +2,7 @@
 // left, and the regime, in words; one line of advice, and what it assumes below that.
 import { $, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
+import { inputsOf } from "./state.js";
 import {
   about,
   around,
@@ -10,6 +11,7 @@ import {
   friction,
   inUnit,
   inWords,
+  middleOf,
   numberOf,
   percent,
   prose,
@@ -57,11 +59,20 @@ export function remains({ mu_macro_low: low, mu_macro_high: high, mu_ratio: rati
   return `${from.replace(" %", "")} to ${to} of µ₀ is left`;
 }
 
-/** The regime, and which share of a period the contact sticks; of an interval, in its middle. */
-function going({ regime, stick_fraction: stick, mu_macro_low: low, mu_macro_high: high }) {
-  const name = capital(inWords(regime));
-  if (high > low) return `${name} in the middle of k`;
+/** The regime, and which share of a period the contact sticks; of an interval, at its middle. */
+function going(answer) {
+  const name = capital(inWords(answer.regime));
+  const middle = middleOf(answer);
+  if (middle) return `${name} at ${middle}`;
+  const stick = answer.stick_fraction;
   return stick > 0 && stick < 1 ? `${name}: sticks for ${percent(stick)} of each period` : name;
+}
+
+/** Which case the last answer is of, where that is another one now. */
+function stays({ state }, store) {
+  const other = inputsOf(state).filter((name) => state[name] !== store.state[name]);
+  const words = other.map((name) => `${symbolOf(name)} = ${state[name]}`).join(", ");
+  return `The last answer stays${words && `, of ${words}`}.`;
 }
 
 /** Where the deviation of the number comes from. */
@@ -70,7 +81,8 @@ function variance({ std_share: shares }) {
   const words = parts
     .sort(([, a], [, b]) => b - a)
     .map(([name, share]) => `${symbolOf(name)} ${Math.round(100 * share)} %`);
-  return words.length ? `The variance comes from ${words.join(", ")}.` : "";
+  const origin = `The variance comes from ${words.join(", ")}`;
+  return words.length ? `${origin}; ± is one standard deviation.` : "";
 }
 
 /** A remark in the page's signs; an interval of k is shown for this one. */
@@ -114,7 +126,9 @@ function sayings(answer) {
   const unit = inputs.k.unit ?? undefined;
   const ends = [inputs.k.low, inputs.k.high].map((end) => inUnit("k", end, unit));
   const middle =
-    high > low ? `k from ${ends.join(" to ")}; ${friction(mu, FEW)} in the middle of it.` : "";
+    high > low
+      ? `k from ${ends.join(" to ")}; µ = ${friction(mu, FEW)} at ${middleOf(answer)}.`
+      : "";
   const own = [
     { row: "interval", words: middle },
     { row: "deviation", words: variance(answer) },
@@ -128,7 +142,7 @@ export function numberPanel(store) {
   $("number").replaceChildren(); // what stands there until the first answer
   return (answer, trouble, old) => {
     const reason = trouble?.text ? prose(trouble.text).replace(/[^.!?]$/, "$&.") : "";
-    write("status", reason && old && trouble.calm ? `${reason} The last answer stays.` : reason);
+    write("status", reason && old && trouble.calm ? `${reason} ${stays(answer, store)}` : reason);
     $("status").classList.toggle("bad", Boolean(trouble && !trouble.calm));
     for (const part of document.querySelectorAll(".result")) part.classList.toggle("old", old);
     if (!answer) {

@@ -141,7 +141,7 @@ export class Plot {
     this.y = scaleOf(y).range([this.height - foot, top]);
     const side = ticked(axisLeft(this.y).tickSizeOuter(0), this.y, 44, y.from);
     const numbers = side.tickValues().map((value) => side.tickFormat()(value).length);
-    const left = 52 + DIGIT * Math.max(0, ...numbers.map((length) => length - 4));
+    const left = 56 + DIGIT * Math.max(0, ...numbers.map((length) => length - 4));
     this.box = {
       x: left,
       y: top,

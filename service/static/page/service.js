@@ -8,7 +8,10 @@ const WAIT_MS = 20_000; // for an answer
 function together(errors) {
   const names = Map.groupBy(errors, ({ reason }) => reason);
   return [...names]
-    .map(([reason, all]) => `${all.map(({ field }) => called(field)).join(", ")}: ${reason}`)
+    .map(([reason, all]) => {
+      const fields = all.map(({ field }) => called(field)).join(", ");
+      return `${fields}${reason.startsWith("must ") ? "" : ":"} ${reason}`;
+    })
     .join("; ");
 }
 

@@ -6,7 +6,17 @@ import { html, nothing, render, svg } from "../lib/lit-html.js";
 import { list } from "./meanings.js";
 import { post } from "./service.js";
 import { caseAround, inputsOf, kindOf } from "./state.js";
-import { about, friction, inUnit, inWords, numberOf, prefixed, show, unitAt } from "./words.js";
+import {
+  about,
+  friction,
+  inUnit,
+  inWords,
+  middleOf,
+  numberOf,
+  prefixed,
+  show,
+  unitAt,
+} from "./words.js";
 
 /**
  * Tabs: buttons "tab-name" that show one of several parts; `chosen(name)` hears which, and the
@@ -98,6 +108,7 @@ function numbers(answer, all) {
       settling === undefined ? null : show(settling.periods ?? Infinity, digits),
       ...without("settling", "across only"),
     ],
+    ["error ≤", "bound of the numerical error of µ", show(answer.error_bound, 2)],
     ["ṽ", "v₀/(l₀ω), dimensionless speed", show(groups.v_tilde ?? Infinity, digits)],
     [
       "ỹ",
@@ -109,7 +120,6 @@ function numbers(answer, all) {
       "µ₀Fz/k: how far the contact is drawn before it slips",
       prefixed(groups.l0, "m", digits),
     ],
-    ["error ≤", "bound of the numerical error of µ", show(answer.error_bound, 2)],
   ];
 }
 
@@ -263,6 +273,8 @@ export function sidePanel(store, moved, found) {
     document.querySelector("[data-meanings=values]").disabled = !answer;
     if (!answer) return;
     const origin = `All are from the block ${answer.source} of the table ${answer.table.id}.`;
+    const middle = middleOf(answer);
+    write("middle", middle && `At ${middle}, the middle of the interval.`);
     list("values", numbers(answer, store.state.digits === "all"), origin);
     render(bars(answer), $("bars"));
     compare();

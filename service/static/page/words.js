@@ -159,6 +159,12 @@ const CALLED = {
   nu2: "ν₂",
 };
 
+/** The k that numbers of an interval of k belong to, in its middle; empty where k is one number. */
+export function middleOf({ mu_macro_low: low, mu_macro_high: high, inputs }) {
+  const { value, unit } = inputs.k ?? {};
+  return high > low ? `k = ${inUnit("k", value, unit ?? undefined)}` : "";
+}
+
 /** A text in which no equation is broken over two lines. */
 export const whole = (text) =>
   text
