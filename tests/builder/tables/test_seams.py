@@ -1,5 +1,6 @@
 """Beside every seam of cells, on both sides: answers of every table, all quantities, slopes."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,14 +8,18 @@ import pytest
 
 from builder.solver.ball import Springs
 from builder.solver.sweep import Sweep
-from builder.tables.build import build_table
+from builder.tables.blocks import build_border
+from builder.tables.build import SAFETY, build_table
 from builder.tables.contacts import ball, slopes_of, spring
+from builder.tables.measure import border_errors
 from mumacro import Surrogate
 from mumacro.inputs.fields import BALL, SPRING, Kind
 from mumacro.table.atlas import MIDDLE, QUANTITIES, QUANTITY_NAMES
+from mumacro.table.polynomials import Border
 from tests.support.cases import opened
 from tests.support.nightly import nightly
 from tests.support.seams import (
+    beside_border_seams,
     beside_every_seam,
     by_its_values,
     off_the_lines,
@@ -83,6 +88,26 @@ def test_a_table_of_an_odd_tolerance_keeps_its_bounds(
     table = build_table(tmp_path / "odd.nc", tolerance, sweep)
     for kind in (SPRING, BALL):
         assert_near_the_finest(table, kind, n)
+
+
+@pytest.mark.parametrize("tolerance", [2e-8, 1e-9])
+def test_the_slope_of_a_border_is_bounded_tightly_beside_its_seams(
+    tolerance: float, sweep: Sweep
+) -> None:
+    """The border of one tolerance in the blocks of the finest table: what slopes along y~ are off
+    by is the border's.  Below y~ = 0.3 its slope hardly counts."""
+    rng, fine = np.random.default_rng(23), opened(1e-12)
+    pieces = build_border(sweep, tolerance)
+    largest = SAFETY * float(border_errors(Border(pieces), sweep, rng, 600).max())
+    pieces = [replace(piece, max_rel_error=largest) for piece in pieces]
+    table = Surrogate(replace(fine.table, border=pieces), fine.path)
+    _, y = beside_border_seams(rng, pieces, table.border, 20_000)
+    y = y[y > 0.3]
+    v = rng.uniform(0.1, 0.9, y.size) * table.v_tilde_crit(y)
+    for name in QUANTITY_NAMES[:2]:
+        rows, truth = (np.array(s.slopes(v, y, name, bounds=True)) for s in (table, fine))
+        share = np.abs(rows[2] - truth[2]) / (rows[4] + truth[4])
+        assert 0.45 < share.max() <= 1.0
 
 
 #: V, Y beside a seam and the steepest ray, at a seam next to it, and next to the ridge
