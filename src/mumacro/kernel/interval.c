@@ -5,14 +5,13 @@
  * before it falls to its limit of rigid contact.  Along, mu~ falls all the way, normal it
  * rises: the ends are the extremes.
  *
- * Both turns begin in one point, y~ = 6.4 for one spring and 8.3 for a ball (there r = 10.4).  So
- * for small r samples stand close where they may be, and two turns between two samples are seen by
- * the cubic through these.  For r > 12 the lower one lies at 4.1 < y~ < 6.2, the upper one between
- * r^2/16 and r^2/2: samples enclose each. */
+ * Both turns begin in one point, y~ = 6.4 for one spring and 8.3 for a ball (there r = 10.4).
+ * Samples stand close there, and two turns between two samples are seen by the cubic through these.
+ * For larger r the lower turn goes down to y~ = 4.1, and the upper one goes up, below r^2/2: samples
+ * enclose each. */
 
 #define MU_TURNING 9.7 /* r from which there are turns */
-#define MU_APART 12.0  /* r from which they are apart, with y~ = 9 between them */
-/* y~ of the samples for less: the first, the step to the next, and how many */
+/* y~ of the close samples: the first, the step to the next, and how many */
 #define MU_CLOSE_LOW 4.5
 #define MU_CLOSE_STEP 1.13
 #define MU_CLOSE_SAMPLES 11
@@ -137,17 +136,11 @@ static void mu_extremes_of(const mumacro_data *data, int contact, int direction,
     of.last = mu_take_sample(&of, end);
     if (direction == MU_ACROSS && ratio > MU_TURNING) {
         const double unit = mu_quotient(low->mu0, low->Fz, low->y0, 1.0, 1.0); /* k for y~ = 1 */
-        const double square = unit * ratio * ratio;
-        if (ratio > MU_APART) {
-            const double around[3] = {3.0 * unit, 9.0 * unit, square / 16.0};
-            for (int i = 0; i < 3; ++i) mu_go_on(&of, mu_min(around[i], high));
-        } else {
-            double k = MU_CLOSE_LOW * unit;
-            for (int i = 0; i < MU_CLOSE_SAMPLES; ++i, k *= MU_CLOSE_STEP)
-                mu_go_on(&of, mu_min(k, high));
-        }
+        double k = MU_CLOSE_LOW * unit;
+        for (int i = 0; i < MU_CLOSE_SAMPLES; ++i, k *= MU_CLOSE_STEP)
+            mu_go_on(&of, mu_min(k, high));
         /* beyond, mu~ falls, in the end by less than its last digit */
-        mu_go_on(&of, mu_min(square / 2.0, high));
+        mu_go_on(&of, mu_min(0.5 * unit * ratio * ratio, high));
     }
     mu_go_on(&of, high);
     if (!(of.least <= of.most)) return;
