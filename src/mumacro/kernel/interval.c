@@ -8,13 +8,13 @@
  * Both turns begin in one point, y~ = 6.4 for one spring and 8.3 for a ball (there r = 10.4).
  * Samples stand close there, and two turns between two samples are seen by the cubic through these.
  * For larger r the lower turn goes down to y~ = 4.1, and the upper one goes up, below r^2/2: samples
- * enclose each. */
+ * enclose each, whose slopes have digits, which that of a far end may not have. */
 
 #define MU_TURNING 9.7 /* r from which there are turns */
 /* y~ of the close samples: the first, the step to the next, and how many */
-#define MU_CLOSE_LOW 4.5
+#define MU_CLOSE_LOW 4.0
 #define MU_CLOSE_STEP 1.13
-#define MU_CLOSE_SAMPLES 11
+#define MU_CLOSE_SAMPLES 12
 #define MU_TURN_WIDTH 1e-7 /* around an extreme, relative to k: mu_macro there is flat to 1e-14 */
 
 /* slope: d mu_macro / d ln k. */

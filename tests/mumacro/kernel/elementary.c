@@ -3,14 +3,14 @@
 #include "kernel.c"
 #include "motion.c"
 
-#define FUNCTION(name, value)                                \
-    void name(int n, const double *first, const double *second, double *out) {                 \
-        for (int i = 0; i < n; ++i) {                                                          \
-            const double x = first[i], y = second[i];                                           \
-            double sine, cosine;                                                                \
-            (void)y, (void)sine, (void)cosine;                                                  \
-            out[i] = value;                                                                     \
-        }                                                                                       \
+#define FUNCTION(name, value)                                                             \
+    void name(int n, const double *first, const double *second, double *out) {            \
+        for (int i = 0; i < n; ++i) {                                                     \
+            const double x = first[i], y = second[i];                                     \
+            double sine, cosine;                                                          \
+            (void)y, (void)sine, (void)cosine;                                            \
+            out[i] = value;                                                               \
+        }                                                                                 \
     }
 
 FUNCTION(sine, (mu_sine_cosine(x, &sine, &cosine), sine))
