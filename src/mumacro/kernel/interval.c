@@ -7,8 +7,8 @@
  *
  * Both turns begin in one point, y~ = 6.4 for one spring and 8.3 for a ball (there r = 10.4).
  * Samples stand close there, and two turns between two samples are seen by the cubic through these.
- * For larger r the lower turn goes down to y~ = 4.1, and the upper one goes up, below r^2/2: samples
- * enclose each, whose slopes have digits, which that of a far end may not have. */
+ * For larger r the lower turn goes down to y~ = 4.1, and the upper one goes up, below r^2/2:
+ * samples enclose each, whose slopes have digits, which that of a far end may not have. */
 
 #define MU_TURNING 9.7 /* r from which there are turns */
 /* y~ of the close samples: the first, the step to the next, and how many */

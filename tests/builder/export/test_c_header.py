@@ -189,10 +189,11 @@ def points(table: Surrogate, n: int, seed: int) -> Any:
 @pytest.mark.parametrize(
     ("form", "name", "lanes"),
     [
-        *(("three", name, 2) for name in LANGUAGES),
+        *(("three", name, 2) for name in ("gcc", "clang", "g++")),
         ("one", "gcc", 2),
+        # zig is clang, and clang++ finds what clang and g++ do, but for a rare thing
+        *(nightly("three", name, 2) for name in ("zig cc", "clang++")),
         *(nightly("one", name, 2) for name in LANGUAGES if name != "gcc"),
-        # zig is clang
         *(("three", name, n) for name in LANGUAGES for n in LANES if n != 2 and name != "zig cc"),
     ],
 )
@@ -317,11 +318,8 @@ def test_every_level_gives_the_librarys_bits(
 
 @pytest.mark.parametrize(
     ("options", "apart"),
-    [
-        (("-O3", "-march=native"), 4),
-        (("-O3", "-march=native", "-ffp-contract=fast"), 4),
-        (("-O2",), 10),
-    ],
+    # without a standard gcc contracts products and sums
+    [(("-O3", "-march=native"), 4), (("-O2",), 10)],
 )
 def test_other_options_move_the_last_digits_alone(
     build: Any, table: Surrogate, options: Any, apart: Any
