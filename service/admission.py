@@ -132,8 +132,8 @@ class Admission:
 
     def _share(self, client: str, whole: int) -> int:
         """Return what one client may have of a whole."""
-        _, at = self._before if self._last[0] == client else self._last
-        is_alone = asyncio.get_running_loop().time() - at > _RECENTLY_S
+        _, moment = self._before if self._last[0] == client else self._last
+        is_alone = asyncio.get_running_loop().time() - moment > _RECENTLY_S
         return max(1, whole - max(1, whole // 8) if is_alone else whole // 2)
 
     # --- bytes ------------------------------------------------------------------------------------

@@ -28,6 +28,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from . import __version__
 from .admission import Admission, Admitted, Thread, join_threads
+from .bodies import Direct
 from .guide_pages import GuidePages
 from .metrics import Metrics
 from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
@@ -35,7 +36,6 @@ from .models.inputs import without_null
 from .models.options import Case, CaseColumns, CaseRequest
 from .observe import LogLines, Observe, Observer
 from .problems import Failures
-from .reading import Direct
 from .routers import batch, case, contact, health, motion, page, questions, table
 from .security import HEALTH_PATHS, SCHEMES, ClearHead, Keys
 from .settings import Settings, load_settings, unknown_variables

@@ -20,12 +20,12 @@ from mumacro.notes import Note, add
 from mumacro.outputs.entry import Output
 from mumacro.outputs.evaluation import chosen, cost
 
+from .bodies import of_members
 from .forms import SLICE, Body, Reason, too_large, write_columns, write_rows
 from .json_text import dump
 from .models.inputs import MAX_REASONS, Column
 from .models.options import BatchOptions, CaseColumns
 from .problems import FieldFault, reason_of, refuse
-from .reading import of_members
 from .tables import LoadedTable, Tables
 
 
@@ -55,7 +55,7 @@ class Batch:
 
     @classmethod
     def of(
-        cls, body: Body, options: BatchOptions, tables: Tables, max_batch: int, **more: Any
+        cls, body: Body, options: BatchOptions, tables: Tables, max_batch: int, **fields: Any
     ) -> "Batch":
         """Return the batch of a body, with the options of body and query together."""
         lengths = {
@@ -93,7 +93,7 @@ class Batch:
         outputs = chosen(model.outputs, cases)
         in_query = options.tolerance is not None
         table = tables.pick(model.tolerance, True if in_query else None)
-        return cls(table, cases, outputs, reasons, body.rows, **more)
+        return cls(table, cases, outputs, reasons, body.rows, **fields)
 
     @property
     def cost(self) -> float:

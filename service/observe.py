@@ -131,10 +131,10 @@ class LogLines(logging.Handler):
             time.sleep(_WRITE_EVERY_S)
             self._writes = True
             lines = [self._waiting.popleft() for _ in range(len(self._waiting))]
-            if more := self._dropped - losses:
-                losses += more
+            if lost := self._dropped - losses:
+                losses += lost
                 _log.warning(
-                    "%d lines of the log were dropped: standard output was not read in time", more
+                    "%d lines of the log were dropped: standard output was not read in time", lost
                 )
             texts = [_written(line, form) for line in lines]
             sizes, sent = [*itertools.accumulate(map(len, texts))], 0

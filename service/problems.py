@@ -102,10 +102,10 @@ def _shown(value: object) -> object:
 def refused(faults: Sequence[FieldFault], **members: Any) -> "RequestError":
     """Return the error that reports all of these faults."""
     first = faults[0]
-    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    rest = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return RequestError(
         ProblemKind.INVALID_VALUE,
-        f"{first.as_json(False)['field']}: {first.reason}{more}",
+        f"{first.as_json(False)['field']}: {first.reason}{rest}",
         faults,
         **members,
     )
@@ -466,13 +466,13 @@ class _BeforeRest:
 
 
 async def _drop_body(receive: Receive) -> None:
-    count, more = 0, True
+    count, unfinished = 0, True
     with suppress(TimeoutError):
         async with asyncio.timeout(_LINGER_S):
-            while more and count < _LINGER:
+            while unfinished and count < _LINGER:
                 message = await asyncio.wait_for(receive(), _PAUSE_S)
                 count += len(message.get("body", b""))
-                more = message.get("more_body", False)
+                unfinished = message.get("more_body", False)
 
 
 class Failures:

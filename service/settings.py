@@ -86,8 +86,10 @@ def _one_name_each(keys: dict[str, Secret[str]]) -> dict[str, Secret[str]]:
     return keys
 
 
-def _whole(default: int, least: int, most: int, more: str = "") -> Any:
-    return Field(default, ge=least, le=most, description=f"an integer from {least}{more} to {most}")
+def _whole(default: int, least: int, most: int, condition: str = "") -> Any:
+    return Field(
+        default, ge=least, le=most, description=f"an integer from {least}{condition} to {most}"
+    )
 
 
 #: what to do about keys that cannot be used

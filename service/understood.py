@@ -82,5 +82,5 @@ def _of(name: str, value: Any, quantity: str) -> dict[str, Any] | None:
     one, unit = read(name, value, quantity), QUANTITIES[quantity].unit
     number = RIGID if math.isinf(one.si) else one.si
     entry: dict[str, Any] = {"text": one.text, "value": number, "unit": one.unit or unit}
-    more = {"std": one.std, "low": one.low, "high": one.high}
-    return entry | {part: x for part, x in more.items() if x is not None}
+    parts = {"std": one.std, "low": one.low, "high": one.high}
+    return entry | {part: x for part, x in parts.items() if x is not None}

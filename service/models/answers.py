@@ -62,11 +62,11 @@ def _included(number: Any, ending: str) -> Any:
 
 def _answer(name: str, included: Any, about: str, number: Any, regime: Any, source: Any) -> Any:
     """Make the model of the default answer and what ``include`` adds."""
-    more = {path for output in OUTPUTS.values() for path in output.members}
+    output_paths = {path for output in OUTPUTS.values() for path in output.members}
     members: dict[str, Any] = {
         path: (number | None, _described(one, None)) if path in BAND else (number, _described(one))
         for path, one in MEMBERS.items()
-        if path not in more
+        if path not in output_paths
     }
     members["regime"] = regime, Field(description="How the contact moves")
     text = "Block of the table, or closed-form tail, that the value came from"

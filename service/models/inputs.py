@@ -75,14 +75,14 @@ OR_RIGID = [{"type": "number", "exclusiveMinimum": 0}, RIGID_SCHEMA]
 NULL = {"type": "null"}
 
 
-def optional(description: str, **more: Any) -> Any:
+def optional(description: str, **keywords: Any) -> Any:
     """Return a member that may be left out; null says the same, but for a query, which has none."""
-    return Field(None, description=description, json_schema_extra=_or_null, **more)
+    return Field(None, description=description, json_schema_extra=_or_null, **keywords)
 
 
-def either(description: str, **more: Any) -> Any:
+def either(description: str, **keywords: Any) -> Any:
     """Return a member that another one may stand for; null is refused."""
-    return Field(None, description=description, json_schema_extra=without_null, **more)
+    return Field(None, description=description, json_schema_extra=without_null, **keywords)
 
 
 def without_null(schema: dict[str, Any]) -> None:
@@ -176,7 +176,7 @@ class CaseInputs(Strict):
     @property
     def inputs(self) -> dict[str, Any]:
         """Those that are given, by name; a rigid contact is infinite."""
-        return _given(self)
+        return _inputs_of(self)
 
 
 class OtherInputs(Strict):
@@ -196,13 +196,13 @@ class OtherInputs(Strict):
     @property
     def inputs(self) -> dict[str, Any]:
         """Those that are given, by name; a rigid contact is infinite, and a null in k stays."""
-        inputs = _given(self)
+        inputs = _inputs_of(self)
         if self.k is None and "k" in self.model_fields_set:
             inputs["k"] = None
         return inputs
 
 
-def _given(model: BaseModel) -> dict[str, Any]:
+def _inputs_of(model: BaseModel) -> dict[str, Any]:
     """Return the inputs that are given, by name; an interval in k by both of its ends."""
     values = model.__dict__
     inputs = {name: values[name] for name in INPUTS if values.get(name) is not None}

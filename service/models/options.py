@@ -68,9 +68,9 @@ class Choice(Strict):
         return words
 
 
-def _deviation(name: str, more: str = "") -> str:
+def _deviation(name: str, condition: str = "") -> str:
     """Return what a deviation is, in the unit of its input."""
-    return f"Standard deviation of {name} [{unit_of(name)}], of independent errors{more}"
+    return f"Standard deviation of {name} [{unit_of(name)}], of independent errors{condition}"
 
 
 class Deviations(Strict):

@@ -81,8 +81,8 @@ def _schema(
     return {"anyOf": kinds, **({} if example is None else {"examples": [example]})}
 
 
-def _is(name: str, positive: bool, example: float | None = None, **more: bool) -> WithJsonSchema:
-    return WithJsonSchema(_schema(name, positive, example, **more))
+def _is(name: str, positive: bool, example: float | None = None, **bounds: bool) -> WithJsonSchema:
+    return WithJsonSchema(_schema(name, positive, example, **bounds))
 
 
 _CHECKED, _IN_SI = WrapValidator(_checked), WrapValidator(_in_si)

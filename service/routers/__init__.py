@@ -10,8 +10,8 @@ from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse
 from starlette.types import Message, Receive, Scope, Send
 
+from ..bodies import DirectRoute
 from ..problems import ProblemKind
-from ..reading import DirectRoute
 
 
 def router_of(

@@ -21,12 +21,12 @@ from mumacro.stopping import look
 
 from ..admission import AT_ONCE, LONG, ticket_of
 from ..batch import Batch
+from ..bodies import JSON, from_client, only_json, read_body, within
 from ..forms import MORE_CASES, read
 from ..json_text import count
 from ..models.inputs import EXAMPLE
 from ..models.options import BatchOptions
 from ..problems import ProblemKind, RequestError
-from ..reading import JSON, from_client, only_json, read_body, within
 from . import POST_PROBLEMS, router_of
 
 router = router_of("answers")
@@ -68,8 +68,8 @@ class _Answer(Response):
                 work() if cost <= AT_ONCE else await ticket_of(self._scope).run(work, cost, receive)
             )
 
-        async def give(piece: bytes, more: bool) -> None:
-            message = {"type": "http.response.body", "body": piece, "more_body": more}
+        async def give(piece: bytes, unfinished: bool) -> None:
+            message = {"type": "http.response.body", "body": piece, "more_body": unfinished}
             await from_client(send(message), self._patience)
 
         only_json(self._fields, f"for more cases than a batch may have {MORE_CASES}")
@@ -94,10 +94,10 @@ class _Answer(Response):
             headers.append((b"content-length", b"%d" % len(piece)))
         await send({"type": "http.response.start", "status": 200, "headers": headers})
         while following is not None:
-            await give(piece, more=True)
+            await give(piece, unfinished=True)
             piece, following = following, await run(lambda: next(pieces, None), cost)
         ticket_of(self._scope).leave()
-        await give(piece, more=False)
+        await give(piece, unfinished=False)
 
     def _batch_in_turn(self, text: bytearray) -> Batch:
         while not _READS.acquire(timeout=_LOOK_EVERY_S):

@@ -39,9 +39,9 @@ async def _answered(request: Request, case: CaseRequest) -> dict[str, Any]:
     """Return the answer to a case."""
     state, inputs = request.app.state, case.inputs
     table = state.tables.pick(case.tolerance)
-    more: dict[str, Any] = {}
+    members: dict[str, Any] = {}
     if case.include and UNDERSTOOD in case.include:
-        more = {UNDERSTOOD: understood(case.model_dump(warnings=False))}
+        members = {UNDERSTOOD: understood(case.model_dump(warnings=False))}
     try:
         if case.model_fields_set <= _PLAIN and "k_low" not in inputs:
             answer = table.surrogate.evaluate(**inputs)
@@ -53,11 +53,11 @@ async def _answered(request: Request, case: CaseRequest) -> dict[str, Any]:
             answer = await compute(request, work) if large else work()
         if case.model:
             work = partial(_of_model, answer)
-            more |= await compute(request, work)
+            members |= await compute(request, work)
     except InputError as error:  # as with_members has it, which is a function more
-        raise of_input(error, **more) from None
+        raise of_input(error, **members) from None
     state.metrics.case(table, answer.source_code)
-    return {**answer.to_dict(), **more, **table.signature}
+    return {**answer.to_dict(), **members, **table.signature}
 
 
 def _of_model(answer: Answer[float]) -> dict[str, Any]:

@@ -16,11 +16,11 @@ from mumacro.inputs.workbooks import BEGIN as WORKBOOK
 
 from .. import API_VERSION
 from ..admission import compute
+from ..bodies import understood_in
 from ..json_text import Json
 from ..models.answers import FitAnswer, PointsAnswer, StiffnessAnswer
 from ..models.questions import MAX_POINTS, FitRequest, StiffnessRequest
 from ..problems import FieldFault, refuse, with_members
-from ..reading import understood_in
 from ..tables import LoadedTable
 from . import POST_PROBLEMS, router_of
 
@@ -37,11 +37,11 @@ MOST = Most(MAX_POINTS, columns=200, cell=200)
 )
 async def post_stiffness(request: Request, contact: StiffnessRequest) -> Response:
     """Return k, and the contact to ask for with it; the arguments of a geometry in SI."""
-    more = await understood_in(request, bool(contact.include))
-    with with_members(**more):
+    members = await understood_in(request, bool(contact.include))
+    with with_members(**members):
         arguments = contact.model_dump(exclude_none=True, exclude={"geometry", "include"})
         answer = contact_of(contact.geometry, **arguments).to_dict()
-        answer |= more
+        answer |= members
         return Json({"geometry": contact.geometry, **answer, "api_version": API_VERSION})
 
 
@@ -95,14 +95,14 @@ def _fitted(
 ) -> dict[str, Any]:
     words: Any = measured.kind.names
     unknowns: Sequence[str] = measured.unknowns
-    reading: dict[str, Any] = {}
+    account: dict[str, Any] = {}
     if points is not None:
         if in_common := sorted(columns.keys() & points.columns.keys()):
             raise InputError(in_common[0], None, "given once: it is a column of the points")
         columns = {**points.columns, **columns}
         if "unknowns" not in measured.model_fields_set:
             unknowns = unknowns_beside(columns)
-        reading = {"read_as": points.read_as, "skipped_lines": points.skipped}
+        account = {"read_as": points.read_as, "skipped_lines": points.skipped}
     try:
         with warnings.catch_warnings():  # they are in the answer
             warnings.simplefilter("ignore")
@@ -112,4 +112,4 @@ def _fitted(
             raise
         reason = f"line {points.lines[error.index]}: {error.field} must be {error.bound}"
         refuse([FieldFault.of("points", reason, error.value)])
-    return {**fit.to_dict(), **reading, **table.signature}
+    return {**fit.to_dict(), **account, **table.signature}

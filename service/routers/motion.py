@@ -10,10 +10,10 @@ from mumacro.errors import InputError
 
 from .. import API_VERSION
 from ..admission import compute
+from ..bodies import understood_in
 from ..json_text import Json
 from ..models.motion import MotionAnswer, MotionRequest
 from ..problems import FieldFault, reason_of, refuse, with_members
-from ..reading import understood_in
 from . import POST_PROBLEMS, router_of
 
 router = router_of("answers")
@@ -28,9 +28,9 @@ _NUMBERS = [one.name for one in fields(mumacro.Motion) if one.name in MotionAnsw
 async def post_motion(request: Request, scene: MotionRequest) -> Response:
     """Compute the steady cycle of a contact that is shaken obliquely, in an ellipse, with harmonics
     or with an oscillating load."""
-    more = await understood_in(request, bool(scene.include))
-    with with_members(**more):
-        return await compute(request, lambda: Json(_answered(scene) | more), scene.cost)
+    members = await understood_in(request, bool(scene.include))
+    with with_members(**members):
+        return await compute(request, lambda: Json(_answered(scene) | members), scene.cost)
 
 
 def _answered(scene: MotionRequest) -> dict[str, Any]:

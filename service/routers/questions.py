@@ -23,6 +23,7 @@ from mumacro.questions.solve_for import TableSolution
 
 from .. import API_VERSION
 from ..admission import compute
+from ..bodies import understood_in
 from ..forms import listed
 from ..json_text import Json
 from ..models.answers import LawAnswer, SolveForAnswer, SolveMotionAnswer
@@ -30,7 +31,6 @@ from ..models.motion import MOTIONS_OF_A_SEARCH, cost_of
 from ..models.options import MODEL
 from ..models.questions import LawRequest, SolveForRequest
 from ..problems import with_members
-from ..reading import understood_in
 from ..tables import LoadedTable, Tables
 from ..understood import UNDERSTOOD
 from . import GET_PROBLEMS, POST_PROBLEMS, router_of
@@ -94,7 +94,7 @@ def _answer_at(
 )
 async def post_law(request: Request, question: LawRequest) -> Response:
     """Return the law in columns, with its static limit and its border."""
-    more = await understood_in(request, question.understood)
+    members = await understood_in(request, question.understood)
 
     def answer() -> Response:
         table = request.app.state.tables.pick(question.tolerance)
@@ -103,10 +103,10 @@ async def post_law(request: Request, question: LawRequest) -> Response:
         axis = {"along": along, "unit": unit_of(along), "values": law.values}
         border = [{"value": mark.value, "mu_macro": mark.mu_macro} for mark in law.border]
         model = {MODEL: [note.as_row for note in law.notes]} if law.notes else {}
-        said = {**model, **more}
+        said = {**model, **members}
         return Json({**axis, **nested(columns), "border": border, **said, **table.signature})
 
-    with with_members(**more):
+    with with_members(**members):
         return await compute(request, answer)
 
 
@@ -168,14 +168,14 @@ def unit_at(path: str) -> str:
 async def post_solve_for(request: Request, question: SolveForRequest) -> Response:
     """Return every root of every target.  A target out of reach has none; ``reachable`` is the
     range of mu_macro.  With ``x``, ``y`` or ``normal`` the question is about any motion."""
-    more = await understood_in(request, question.understood)
-    with with_members(**more):
+    members = await understood_in(request, question.understood)
+    with with_members(**members):
         if question.is_motion:
             one = cost_of(question.contact, question.x, question.y, question.normal)
             cost = len(question.target) * MOTIONS_OF_A_SEARCH * one
-            return await compute(request, lambda: Json(_solved_motion(question) | more), cost)
+            return await compute(request, lambda: Json(_solved_motion(question) | members), cost)
         tables: Tables = request.app.state.tables
-        return await compute(request, lambda: Json(_solved(question, tables) | more))
+        return await compute(request, lambda: Json(_solved(question, tables) | members))
 
 
 def _solved_motion(question: SolveForRequest) -> dict[str, Any]:
@@ -221,9 +221,9 @@ def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
         **case,
     )
     answer = _in_quantity(question, solution.to_dict(), unit)
-    more = iter(_included(question, table, name, solution))
+    included = iter(_included(question, table, name, solution))
     for result in answer["results"]:
-        result["roots"] = [root | next(more) for root in result["roots"]]
+        result["roots"] = [root | next(included) for root in result["roots"]]
     for k, end in zip(ends_in(case) or (), answer.get("ends", ()), strict=True):
         end |= {"k": k, **_in_quantity(question, end, unit)}
     answer |= {"quantity": question.quantity}

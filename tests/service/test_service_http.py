@@ -19,10 +19,10 @@ from starlette.websockets import WebSocketDisconnect
 from mumacro.errors import InputError, TableError
 from mumacro.inputs.cases import DEVIATIONS
 from mumacro.inputs.fields import FIELDS, SI
+from service.bodies import DirectRoute
 from service.models.inputs import EXAMPLE
 from service.models.options import CaseRequest
 from service.problems import ProblemKind, meaning
-from service.reading import DirectRoute
 from tests.support.cases import Case
 from tests.support.places import ROOT
 

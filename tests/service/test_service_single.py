@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mumacro import Surrogate
-from service import reading
+from service import bodies
 from tests.support.cases import Case, flat
 from tests.support.comparing import close
 from tests.support.settling import settling
@@ -218,7 +218,7 @@ def test_an_endpoint_answers_a_case_by_seven_functions(client: Any, case: Case) 
         "headers": [(b"host", b"here"), (b"content-type", b"application/json")],
     }
     statuses, called, depth = list[int](), set[str](), 0
-    service = str(Path(reading.__file__).parent)
+    service = str(Path(bodies.__file__).parent)
 
     async def receive() -> Any:
         return {"type": "http.request", "body": text}

@@ -11,8 +11,8 @@ import pytest
 from starlette.types import Message, Receive, Scope, Send
 
 from service.admission import Admission, Admitted, Ticket
+from service.bodies import read_body
 from service.problems import FULL, RequestError
-from service.reading import read_body
 from service.security import HEALTH_PATHS
 from service.settings import Settings
 from tests.support.serving import CASE

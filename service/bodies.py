@@ -108,7 +108,7 @@ async def read_body(
     then it is answered before anything else is read."""
     length = headers.get(b"content-length", b"0").strip()
     size = int(length) if length.isdigit() and len(length) < 19 else limit + 1
-    body, more = bytearray(), True
+    body, unfinished = bytearray(), True
     ticket: Ticket | None = None
     while True:
         if size > limit:
@@ -121,17 +121,17 @@ async def read_body(
                 f"a body may have up to {limit} bytes: {remedy}",
                 max_bytes=limit,
             )
-        if size > AT_ONCE or (body and more):
+        if size > AT_ONCE or (body and unfinished):
             ticket = ticket or ticket_of(scope)
             ticket.weigh(size)
             ticket.hold(len(body))
-        if not more:
+        if not unfinished:
             return body.removeprefix(_BYTE_ORDER_MARK)  # RFC 8259, 8.1
         message = await receive()
         if message["type"] != "http.request":
             raise ClientDisconnect
         body += message.get("body", b"")
-        more = message.get("more_body", False)
+        unfinished = message.get("more_body", False)
         size = len(body)
 
 
@@ -142,11 +142,11 @@ async def small_body(request: Request) -> bytes:
         only_json(headers)
     settings = request.app.state.settings
     limit = min(SMALL_BODY, settings.max_body_bytes)
-    reading = read_body(headers, request.receive, limit, request.scope)
+    receiving = read_body(headers, request.receive, limit, request.scope)
     if ABORT in request.scope.get("state", ()):  # our own server limits this wait (server.py)
-        body = bytes(await reading)
+        body = bytes(await receiving)
     else:
-        body = bytes(await from_client(reading, settings.client_timeout_s))
+        body = bytes(await from_client(receiving, settings.client_timeout_s))
     query = request.scope["query_string"]
     if query and (pairs := _pairs(query)):
         refuse(
