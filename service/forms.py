@@ -17,7 +17,16 @@ from pydantic import ValidationError
 from mumacro.answer import TEXTS, Answer, nested
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, named
-from mumacro.inputs.fields import AMPLITUDE, DIRECTIONS, ENDS, FIELDS, SPRING, field_of, kind_of
+from mumacro.inputs.fields import (
+    AMPLITUDE,
+    CONTACTS,
+    DIRECTIONS,
+    ENDS,
+    FIELDS,
+    SPRING,
+    field_of,
+    kind_of,
+)
 from mumacro.inputs.names import unknown_name
 from mumacro.stopping import look
 
@@ -32,6 +41,7 @@ Reason = tuple[str | None, str]
 MORE_CASES = "send several requests, or give `mumacro eval` a file, or use Dask"
 SLICE = 8192  # cases that are computed and written at a time
 _NUMBERS = (*INPUTS, *DEVIATIONS)  # members that hold numbers
+_WORDS = {"contact": CONTACTS, "direction": DIRECTIONS}  # members that hold words, and which
 _REST = tuple(name for name in CaseColumns.model_fields if name not in _NUMBERS)
 _KNOWN = len(CaseColumns.model_fields)  # number of names that a case or its columns may have
 _REQUIRED = frozenset(name for name, about in Case.model_fields.items() if about.is_required())
@@ -67,7 +77,7 @@ def read(text: bytearray, max_batch: int, words: Mapping[str, Any]) -> Body:
     try:
         if not _OPENS_LIST.match(text):
             return Body(decode_columns(text, _NUMBERS, _REST))
-        columns = decode_rows(text, _NUMBERS, KIND)
+        columns = decode_rows(text, _NUMBERS, _WORDS)
         _check_names(columns, words)
         return Body(columns, rows=True)
     except (*NotRead, InputError):

@@ -147,19 +147,20 @@ def _members(numbers: tuple[str, ...], rest: tuple[str, ...]) -> Callable[[bytea
 
 
 def decode_rows(
-    text: bytearray, numbers: Collection[str], words: Collection[str]
+    text: bytearray, numbers: Collection[str], words: Mapping[str, tuple[str, ...]]
 ) -> dict[str, Any]:
     """Return rows as columns: arrays of numbers, an infinite k where it is the word rigid, and
     lists of words.
 
     Raise one of :data:`NotRead` unless all rows have the names of the first one, which are among
-    ``numbers`` and ``words``, and values of these types.
+    ``numbers`` and ``words``, and their values are numbers and the words that a name may have.
     """
     names = _first_names(text)
     if not {*names} <= {*numbers, *words}:
         raise ValueError("an unknown name")
     numbers = [name for name in names if name in numbers]
-    rows = _rows(names, tuple(numbers))(text)
+    allowed = tuple(words[name] for name in names if name in words)
+    rows = _rows(names, tuple(numbers), allowed)(text)
     all_numbers = len(numbers) == len(names)
     values_of = msgspec.structs.astuple if all_numbers else attrgetter(*numbers)
     size = len(rows) * len(numbers)
@@ -184,12 +185,16 @@ def _first_names(text: bytearray) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=64)
-def _rows(names: tuple[str, ...], numbers: tuple[str, ...]) -> Callable[[bytearray], Any]:
-    """Return what reads rows with these names in any order; it takes half of the time of rows that
-    are dictionaries."""
-    kinds = {name: float if name in numbers else str for name in names}
+def _rows(
+    names: tuple[str, ...], numbers: tuple[str, ...], allowed: tuple[tuple[str, ...], ...]
+) -> Callable[[bytearray], Any]:
+    """Return what reads rows with these names in any order, where the names that are not among
+    ``numbers`` have one of the words ``allowed`` each; it takes half of the time of rows that are
+    dictionaries."""
+    words = (Literal[one] for one in allowed)
+    kinds: dict[str, Any] = {name: float if name in numbers else next(words) for name in names}
     if "k" in kinds:
-        kinds["k"] = float | Literal["rigid"]  # type: ignore[assignment]
+        kinds["k"] = float | Literal["rigid"]
     row = msgspec.defstruct("Row", [*kinds.items()], forbid_unknown_fields=True, gc=False)
     return msgspec.json.Decoder(list[row]).decode  # type: ignore[valid-type]
 
