@@ -79,10 +79,11 @@ class TabulatedContact:
     blocks: list[Block]  #: in the order of the charts
     #: the tolerance of mu~ and what verification found, ``docs/table-format.md`` has the list
     attributes: dict[str, Any] = field(default_factory=dict)
-    charts: tuple[atlas.Chart, ...] = field(init=False, repr=False)  #: the geometry of the blocks
 
-    def __post_init__(self) -> None:
-        self.charts = atlas.CHARTS[self.name]
+    @property
+    def charts(self) -> tuple[atlas.Chart, ...]:
+        """The geometry of the blocks."""
+        return atlas.CHARTS[self.name]
 
     @property
     def tolerance(self) -> float:
