@@ -37,7 +37,7 @@ POLICY = (
     "'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 
-_HALF = "half of p-p"
+_HALF = "half of peak to peak"
 # label, offered units, decimal exponents of the usual range [SI], text at the start, a note
 _INPUTS = {
     "mu0": ("friction", ["-"], [-2, 0.5], "0.3", ""),

@@ -619,7 +619,7 @@ def test_every_trouble_of_the_service_has_its_own_message(
             (f"async () => {answer % 422}", "^too many cases", True),
             (
                 "async () => new Response('<html>', { status: 200 })",
-                "cannot be read .status 200.. Asking again by itself",
+                "cannot be read .status 200.. Retrying automatically",
                 False,
             ),
             (
@@ -641,12 +641,14 @@ def test_every_trouble_of_the_service_has_its_own_message(
             "window.reply = () => Promise.reject(new TypeError());"
             "document.querySelector('[value=rigid]').click();"
         )
-        page.wait_for("#status", "^The service does not answer. Asking again by itself.")
+        page.wait_for("#status", "^No answer from the service. Retrying automatically.")
+        assert re.match("Shown: .*k = 1 N/", page.text("#shown"))  # what the grey number is for
         page.run("delete window.reply; dispatchEvent(new Event('online'));")
         page.settle()
         rigid = surrogate.evaluate(**{**START, "k": "rigid"}).mu_macro
         assert page.number() == page.rounded(rigid)
         assert (page.is_old("#number"), page.text("#status")) == (False, "")
+        assert page.text("#shown") == ""
 
 
 def test_the_start_is_calm_while_the_service_is_not_ready(
@@ -658,7 +660,7 @@ def test_the_start_is_calm_while_the_service_is_not_ready(
         "headers: { 'Retry-After': '1' } }))"
     )
     with open_page.faked(unready, wait=False) as page:
-        page.wait_for("#status", "the tables are not loaded yet. Asking again by itself.$")
+        page.wait_for("#status", "the tables are not loaded yet. Retrying automatically.$")
         assert not page.is_red("#status")
         assert page.text("#law-status") == page.text("#solve-status") == ""
         assert len(page.texts("[aria-invalid=true]")) == 0
@@ -696,7 +698,7 @@ def test_a_phone_shows_the_number_wherever_the_page_is(open_page: Any) -> None:
         assert page.find("#now").rect["y"] == close(scrolled, abs=0.5)
         assert page.find(place).rect["y"] - scrolled >= height  # covers nothing that is sought
     page.type("#field-y0", "0")
-    assert page.text("#now") == "µ = 0.3000, continuous sliding"
+    assert page.text("#now") == "µ = 0.3000, 100 % left"
     assert not open_page(width=1280, height=800).find("#now").is_displayed()
 
 

@@ -50,7 +50,7 @@ export class Channel {
 
   again(pending, { later, seconds, key }) {
     this.next = pending;
-    this.report(later ? `${later} Asking again by itself.` : null, true);
+    this.report(later ? `${later} Retrying automatically.` : null, true);
     if (key) showKeyForm(true);
     return new Promise((wake) => {
       this.wake = wake;

@@ -59,6 +59,7 @@ export function cards(store, moved, aim, again) {
     motion(answer, settled || trouble !== null);
     for (const name of LAW_FIELDS) $(name).value = state[name];
     $("digits").checked = state.digits === "all";
+    $("axis").checked = state.axis === "zero";
     $("exponent-field").hidden = state.along !== "Fz" && state.unknown !== "Fz";
     write("print-case", location.href);
     write("print-date", new Date().toISOString().slice(0, 10));
@@ -89,11 +90,11 @@ function panels(store) {
   };
 }
 
-/** What is chosen of the law, and how many digits are shown. */
+/** What is chosen of the law and its axes, and how many digits are shown. */
 function lawFields(store) {
   for (const [name, { symbol }] of Object.entries(about.inputs))
     $("along").append(new Option(symbol, name));
-  const unit = (name) => $(name).placeholder.split(" ")[1]; // in which the ends of the axis read
+  const unit = (name) => $(name).placeholder.split(" ")[2]; // in which the ends of the axis read
   function changeOf(name, value) {
     if (name === "along") return { along: value, from: "", to: "" };
     const end = name === "from" || name === "to";
@@ -103,6 +104,9 @@ function lawFields(store) {
     $(name).addEventListener("change", ({ target: { value } }) =>
       store.change(changeOf(name, value)),
     );
+  $("axis").addEventListener("change", ({ target: { checked } }) =>
+    store.change({ axis: checked ? "zero" : "fit" }),
+  );
   $("digits").addEventListener("change", ({ target: { checked } }) =>
     store.change({ digits: checked ? "all" : "few" }),
   );

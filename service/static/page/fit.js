@@ -4,7 +4,7 @@ import { Channel } from "./ask.js";
 import d3 from "./d3.js";
 import { $, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
-import { Plot } from "./plot.js";
+import { Plot, circleAt } from "./plot.js";
 import { post } from "./service.js";
 import { exactCase } from "./state.js";
 import { about, inPrint, inUnit, prose, show, toSI, toUnit, unitFor, whole } from "./words.js";
@@ -13,6 +13,8 @@ const { area } = d3;
 
 const SIX = 6; // digits of a fitted value, at most
 const ROWS = 6; // of the table that was read, which are shown
+const KEY = 26; // pixels above the frame, for what the signs mean
+const STRIP = 84; // pixels below its axis, for the residuals
 /** What a fit takes from the table beside the inputs. */
 const MEASURED = ["mu_macro", "std"];
 
@@ -167,7 +169,7 @@ export function fitPanel(store, moved, openCase) {
     };
     const line = (words, one) =>
       html`<li>
-        <span>${words}</span
+        <span>${whole(words)}</span
         ><button class="use" aria-label=${`Use ${words}`} @click=${use(one)}>Use</button>
       </li>`;
     return [
@@ -224,17 +226,17 @@ export function fitPanel(store, moved, openCase) {
     $("fit-button").disabled = !table;
     $("fit-hint").hidden = Boolean(table);
     $("fit-caption").hidden = !fit;
-    const of = fit?.curve
-      ? "Line: the fit, with its 95 % band."
-      : "Rings: the fit, at µ₀ of each point.";
-    write("fit-legend", `Dots: measured, ± std where it is known. ${of}`);
+    write(
+      "fit-legend",
+      table?.columns.std ? "Bars: ± one standard deviation of a point." : "",
+    );
     render(result(), $("fit-lines"));
     const old = fit && JSON.stringify(question()) !== JSON.stringify(fit.question);
     $("fit-lines").classList.toggle("old", Boolean(old));
     plot.redraw();
   }
 
-  /** Points, fit and band above; below them, on the same axis, the residuals. */
+  /** Points, fit and band; below the axis of v₀ a strip with the residuals. */
   function paint() {
     if (!table?.columns.v0 || !table.columns.mu_macro) {
       plot.clear();
@@ -255,10 +257,11 @@ export function fitPanel(store, moved, openCase) {
       1.08 * Math.max(...measured.map((mu, i) => mu + (std[i] || 0)), ...(curve?.high ?? [0]));
     const residuals = fit?.residuals ?? [];
     const worst = Math.max(...residuals.map((one, i) => Math.abs(one) + (std[i] || 0)), 1e-12);
-    const share = residuals.length ? 0.3 : 0; // of the height, for the residuals
     plot.axes({
-      x: { domain, log, title: `v₀ [${unit}]` },
-      y: { domain: [(-share / (1 - share)) * top, top], log: false, title: "friction µ", from: 0 },
+      x: { domain, log, title: `v₀ [${inPrint(unit)}]` },
+      y: { domain: [0, top], log: false, title: "friction µ" },
+      top: KEY,
+      below: residuals.length ? STRIP : 0,
     });
     const { inside } = plot;
     if (curve) {
@@ -273,55 +276,50 @@ export function fitPanel(store, moved, openCase) {
         "curve",
       );
     }
-    const bar = (i, y, size) =>
-      plot.path(
-        [
-          [x[i], y - size],
-          [x[i], y + size],
-        ],
-        "measured",
-      );
-    const dot = (i, y, kind = "measured", radius = 3.5) =>
-      inside
+    const dot = (i, y, layer = inside, kind = "measured", radius = 3.5) =>
+      layer
         .append("circle")
         .attr("class", kind)
         .attr("r", radius)
         .attr("cx", plot.x(x[i]))
-        .attr("cy", plot.y(y));
-    measured.forEach((mu, i) => {
-      if (std[i]) bar(i, mu, std[i]);
-      dot(i, mu);
-    });
+        .attr("cy", y);
+    /** A point with its deviation, on a scale of µ. */
+    const measuredAt = (i, mu, scale, layer) => {
+      if (std[i]) {
+        const [from, to] = [mu - std[i], mu + std[i]].map(scale);
+        layer.append("path").attr("class", "measured").attr("d", `M${plot.x(x[i])} ${from}V${to}`);
+      }
+      dot(i, scale(mu), layer);
+    };
+    measured.forEach((mu, i) => measuredAt(i, mu, plot.y, inside));
+    key(curve);
     if (!residuals.length) return;
-    // µ₀ of each point is another one: there is no curve
-    if (!curve) residuals.forEach((one, i) => dot(i, measured[i] - one, "fitted", 6));
-    const middle = (-0.5 * share * top) / (1 - share);
-    const scale = (0.4 * share * top) / (1 - share) / worst;
-    plot.path(
-      [
-        [domain[0], 0],
-        [domain[1], 0],
-      ],
-      "rule",
-    );
-    plot.path(
-      [
-        [domain[0], middle],
-        [domain[1], middle],
-      ],
-      "still",
-    );
-    residuals.forEach((one, i) => {
-      bar(i, middle + scale * one, scale * (std[i] || 0));
-      dot(i, middle + scale * one);
-    });
-    plot.text(
-      `residuals, ± ${show(worst, 2)} at most`,
-      plot.box.x + 6,
-      plot.box.y + plot.box.height - 5,
-      "note",
-      "start",
-    );
+    // µ₀ of each point is another one: there is no curve, but rings and a thin line for the eye
+    if (!curve) {
+      const fitted = measured.map((mu, i) => mu - residuals[i]);
+      const order = x.map((_, i) => i).sort((a, b) => x[a] - x[b]);
+      plot.path(
+        order.map((i) => [x[i], fitted[i]]),
+        "fitted thin",
+      );
+      fitted.forEach((mu, i) => dot(i, plot.y(mu), inside, "fitted", 6));
+    }
+    const strip = plot.strip({ most: worst, title: "residuals", pixels: STRIP });
+    residuals.forEach((one, i) => measuredAt(i, one, strip, plot.over));
+  }
+
+  /** What the signs of the plot mean, above its frame. */
+  function key(curve) {
+    const { over, box } = plot;
+    const sign = (kind, shape, words, x) => {
+      over.append("path").attr("class", kind).attr("d", shape);
+      plot.text(words, x, 14, "note", "start");
+    };
+    sign("measured", circleAt(box.x + 6, 10, 3.5), "measured", box.x + 14);
+    if (!fit) return;
+    const at = box.x + 90;
+    if (curve) sign("curve", `M${at} 10h18`, "fit, 95 % band", at + 24);
+    else sign("fitted", circleAt(at + 6, 10, 6), "fit, at µ₀ of each point", at + 18);
   }
 
   $("points").addEventListener("change", ({ target }) => {

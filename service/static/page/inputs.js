@@ -100,8 +100,9 @@ export function inputsPanel(store, moved) {
 
   /** Where k comes from, which is the input that nobody knows. */
   function ways(k) {
-    const tool = (panel, words) => html`
+    const tool = (panel, words, title) => html`
       <button
+        title=${title}
         id=${`tab-${panel}`}
         type="button"
         aria-controls="tool"
@@ -123,8 +124,10 @@ export function inputsPanel(store, moved) {
       </button>
     `;
     return html`<p class="ways">
-      from ${tool("stiffness", "materials")} ${tool("fit", "points")} ${interval}
-      <a href=${pageOf("how-to/loop")}>loop</a>
+      <span>k from:</span> ${tool("stiffness", "materials", "k from materials")}
+      ${tool("fit", "points", "k from measured points of friction")}
+      ${interval}
+      <a title="k from a measured loop" href=${pageOf("how-to/loop")}>loop</a>
     </p>`;
   }
 
@@ -143,13 +146,14 @@ export function inputsPanel(store, moved) {
     stepped = { name, value, text: store.state[name] };
   }
 
-  function sketch() {
+  /** The set-up as a drawing and in words, with the reasons for what cannot be chosen. */
+  function sketch(reasons) {
     const { contact, direction } = store.state;
     for (const part of $("sketch").querySelectorAll(".body, .motion"))
       part.toggleAttribute("hidden", !part.matches(`.body.${contact}, .motion.${direction}`));
     const words = `${about.choices.contact[contact]}, ${about.choices.direction[direction]}`;
     attribute("sketch", "aria-label", `The set-up: ${words}`);
-    write("chosen", `${words[0].toUpperCase()}${words.slice(1)}.`);
+    write("chosen", [`${words[0].toUpperCase()}${words.slice(1)}.`, ...reasons].join(" "));
   }
 
   function fields() {
@@ -202,7 +206,7 @@ export function inputsPanel(store, moved) {
       ],
       $("choices"),
     );
-    sketch();
+    sketch(new Set([...Object.values(ball), ...Object.values(ways)]));
     fields();
   };
 }

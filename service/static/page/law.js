@@ -2,6 +2,7 @@
 import { Channel } from "./ask.js";
 import d3 from "./d3.js";
 import { $, attribute, write } from "./dom.js";
+import { headline } from "./number.js";
 import { Plot, save } from "./plot.js";
 import { post } from "./service.js";
 import { caseAround, inputsOf } from "./state.js";
@@ -23,6 +24,8 @@ import {
 const { area, bisectCenter } = d3;
 
 const POINTS = 241;
+const FAR = 0.25; // of the axis of µ: what is drawn above that has an axis that does not begin at 0
+const FLAT = 0.03; // of µ: what varies less is drawn over an axis from 0
 const EXTREMES = [1e-300, 1e300]; // of a range
 const POSITIVE = ["mu0", "Fz", "k"]; // inputs that cannot be 0
 
@@ -112,6 +115,15 @@ export function lawPanel(store, moved) {
     if (std) return [-1, 1].map((side) => mu.map((one, i) => Math.max(one + side * std[i], 0)));
     return low ? [low, high] : null;
   }
+  /** The lower end of the axis of µ: 0, or a little below what is drawn where that is far above. */
+  function bottom(top) {
+    const low = answer.mu_macro - (answer.std ?? 0);
+    const drawn = [low, ...law.mu_static, ...law.mu_macro, ...(band() ?? []).flat()];
+    const [least, most] = [Math.min(...drawn), Math.max(...drawn)];
+    const bottom = least - 0.15 * (top - least);
+    const flat = most - least < FLAT * most;
+    return store.state.axis === "zero" || flat || bottom < FAR * top ? 0 : bottom;
+  }
   const shown = () => law.values.map((value) => toUnit(law.along, value, unit()));
 
   function paint() {
@@ -121,7 +133,8 @@ export function lawPanel(store, moved) {
     const places = shown();
     plot.axes({
       x: { domain: [places[0], places.at(-1)], log: law.scale === "log", title: heading() },
-      y: { domain: [0, top], log: false, title: "friction µ" },
+      y: { domain: [bottom(top), top], log: false, title: "friction µ" },
+      lines: true,
     });
     const { inside, box } = plot;
     plot.path(
@@ -150,14 +163,22 @@ export function lawPanel(store, moved) {
         left ? "end" : "start",
       );
     }
-    const still = plot.y(law.mu_static[0]);
-    plot.text(
-      "static µ",
-      box.x + 10,
-      Math.min(still + 14, box.y + box.height - 6),
-      "note",
-      "start",
-    );
+    nameStatic(places);
+  }
+
+  /** Names the dotted line where it is farthest from the curve, below it or above. */
+  function nameStatic(places) {
+    const { box } = plot;
+    const away = law.mu_static.map((mu, i) => Math.abs(plot.y(mu) - plot.y(law.mu_macro[i])));
+    const inner = away.map((far, i) => {
+      const x = plot.x(places[i]) - box.x;
+      return x > 40 && x < box.width - 40 ? far : -1;
+    });
+    const i = inner.indexOf(Math.max(...inner));
+    const [x, y] = [plot.x(places[i]), plot.y(law.mu_static[i])];
+    const foot = box.y + box.height;
+    const below = law.mu_static[i] <= law.mu_macro[i] ? y + 14 < foot : y - 14 < box.y;
+    plot.text("static µ", x, below ? y + 14 : y - 6, "note");
   }
 
   /** The line of the target and the user's point. */
@@ -203,18 +224,27 @@ export function lawPanel(store, moved) {
           .y1((_, i) => plot.y(high[i]))(places),
       );
 
+  /** µ of the case as the headline has it. */
+  function number(one) {
+    const { value, std } = headline(one, false);
+    return std ? `${value} ± ${std}` : value;
+  }
+
   /** What stands below the law: at the pointer, else at the user's point. */
   function read(place) {
     pointer = place;
     if (!law) return;
     if (!place || !plot.box || !plot.holds(place)) {
       const one = numberOf(answer?.inputs[law.along]);
+      const middle = middleOf(answer?.inputs);
+      const where = middle && law.along !== "k" ? ` and ${middle}` : "";
       const words =
         one === undefined
           ? ""
-          : `${middleOf(answer) && law.along !== "k" ? `At ${middleOf(answer)}` : "Your case"}: ` +
-            `${text(one)}, µ = ${friction(answer.mu_macro, 4)}`;
-      write("law-read", whole(words));
+          : `${middle ? "At" : "Your case:"} ${text(one)}${where}, ` +
+            `µ = ${middle ? friction(answer.mu_macro, 4) : number(answer)}`;
+      const scale = colours && law.along !== "mu0" ? " Colours: as on the map." : "";
+      write("law-read", whole(words && `${words}.${scale}`));
       return;
     }
     const i = bisectCenter(law.values, toSI(law.along, plot.x.invert(place[0]), unit()));
@@ -284,14 +314,15 @@ export function lawPanel(store, moved) {
       return;
     }
     const { value: mu0 } = answer.inputs.mu0;
-    const below = [unit(), mu0, answer.std, colours?.contact, colours?.direction].join();
+    const kind = [colours?.contact, colours?.direction];
+    const below = [unit(), mu0, answer.std, state.axis, ...kind].join();
     if (below !== ground) plot.redraw();
     ground = below;
     const question = lawQuestion(state, answer);
     const [low, high] = usualRange(state, answer);
     const usual = unitOver(state.along, low, high, answer.inputs[state.along]?.unit);
-    $("from").placeholder = inUnit(state.along, low, usual, 3);
-    $("to").placeholder = inUnit(state.along, high, usual, 3);
+    $("from").placeholder = `auto: ${inUnit(state.along, low, usual, 3)}`;
+    $("to").placeholder = `auto: ${inUnit(state.along, high, usual, 3)}`;
     if (law) describe();
     const words = JSON.stringify(question);
     if (words === latest) return;

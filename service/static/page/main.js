@@ -131,6 +131,10 @@ addEventListener(
   },
   true,
 );
+// a link to a part would take the place of the case in the address
+$("jump").addEventListener("click", ({ target }) =>
+  $(target.closest("[data-to]")?.dataset.to)?.scrollIntoView(),
+);
 $("print").addEventListener("click", () => window.print());
 new Channel(
   () => getPreloaded("static/page/names.json"),

@@ -20,6 +20,7 @@ function deviationOf(inputs, names) {
   return Math.hypot(...relative);
 }
 
+const PALE = 0.5; // of µ/µ₀, from which the map is so pale that words on it are dark
 const SPEED = ["v0", "k", "mu0", "Fz", "f"]; // what ṽ depends on
 const AMPLITUDE = { y0: ["y0", "k", "mu0", "Fz"], Fz_amplitude: ["Fz_amplitude", "Fz"] };
 
@@ -42,12 +43,18 @@ export function mapPanel(store, moved, loaded) {
     (reason) => write("map-read", reason ?? ""),
   );
 
+  /** Where a place of a contour, in cells of the grid, is in the plot. */
+  const onPlot = ([column, row]) => [
+    plot.box.x + ((column - 0.5) / (map.v_tilde.n - 1)) * plot.box.width,
+    plot.box.y + (1 - (row - 0.5) / (map.y_tilde.n - 1)) * plot.box.height,
+  ];
+
   /** A ring of a contour in cells of the grid, as the path of a plot. */
   function outline({ coordinates }) {
-    const { box } = plot;
-    const x = (at) => box.x + ((at - 0.5) / (map.v_tilde.n - 1)) * box.width;
-    const y = (at) => box.y + box.height - ((at - 0.5) / (map.y_tilde.n - 1)) * box.height;
-    const place = ([a, b]) => `${x(a).toFixed(1)} ${y(b).toFixed(1)}`;
+    const place = (at) =>
+      onPlot(at)
+        .map((one) => one.toFixed(1))
+        .join(" ");
     return coordinates
       .flat()
       .map((ring) => `M${ring.map(place).join("L")}Z`)
@@ -64,8 +71,8 @@ export function mapPanel(store, moved, loaded) {
         log: map.y_tilde.log,
         title: normal ? "amplitude ỹ = ΔFz/Fz" : "amplitude ỹ = y₀/l₀",
       },
-      top: 40,
-      right: 62,
+      top: ownSizes() ? 40 : 12,
+      right: ownSizes() ? 62 : 24,
       below: 19 + 11 * numberLines(),
     });
     const { box, inside, over } = plot;
@@ -81,22 +88,49 @@ export function mapPanel(store, moved, loaded) {
     plot.rimmed(plot.shape(map.border.filter(([v, y]) => v > 0 && y > 0)), "border");
     const at = (u, w) => [box.x + u * box.width, box.y + (1 - w) * box.height];
     // a number gives way to the name of a regime
-    for (const [u, w, words] of map.areas) plot.area(words, ...at(u, w));
+    for (const [u, w, words] of map.areas)
+      plot.area(words, ...at(u, w), `area${ratioAt(u, w) < PALE ? " deep" : ""}`);
     for (const [level, u, w] of map.labels)
       plot.text(show(level), ...at(u, w), "tag").attr("dy", "0.35em");
     legend(over);
   }
 
-  /** The line of the target and the user's point. */
+  /** µ/µ₀ of the grid at a place of the frame, from 0 to 1 to the right and up. */
+  function ratioAt(u, w) {
+    const [column, row] = [u * (map.v_tilde.n - 1), w * (map.y_tilde.n - 1)].map(Math.round);
+    return map.mu_ratio[row * map.v_tilde.n + column] * map.unit;
+  }
+
+  /** The line of the target with its number, and the user's point. */
   function mark() {
     if (target) {
       const values = map.mu_ratio.map((one) => one * map.unit);
       const shape = contours().size([map.v_tilde.n, map.y_tilde.n]).contour(values, target);
       plot.rimmed(outline(shape), "target");
+      numbered(shape);
     }
-    if (!answer?.groups || store.state.contact === "rigid") return;
-    if (answer.state.direction === map.direction) ownAxes(answer);
-    point(answer.groups, answer.inputs);
+    const size = ownSizes();
+    if (size) ownAxes(answer, size);
+    if (placeOf(answer)) point(placeOf(answer), answer.inputs);
+  }
+
+  /** The number of the target beside its line, where that is farthest to the right in the frame. */
+  function numbered({ coordinates }) {
+    const { box } = plot;
+    const places = coordinates.flat(2).map(onPlot);
+    const [x, y] = places
+      .filter(([x, y]) => x < box.x + 0.9 * box.width && y > box.y + 20 && y < box.y + box.height - 9)
+      .reduce((best, one) => (one[0] > best[0] ? one : best), [-Infinity, 0]);
+    if (x > box.x) plot.text(show(target), x + 8, y + 4, "tag target-number", "start");
+  }
+
+  /** Where a case is on the map, null where it has no place. Without oscillation the service has no
+   * ṽ, but v₀ has its place on the case's own axis. */
+  function placeOf(one) {
+    if (!one?.groups || store.state.contact === "rigid") return null;
+    const { v_tilde: v, y_tilde: y, l0 } = one.groups;
+    const size = l0 * 2 * Math.PI * one.inputs.f.value;
+    return { v: v ?? (size > 0 ? one.inputs.v0.value / size : Infinity), y: y ?? Infinity };
   }
 
   /** The speed and the amplitude of a case where ṽ and ỹ are 1 [SI]. */
@@ -106,16 +140,22 @@ export function mapPanel(store, moved, loaded) {
     Fz_amplitude: inputs.Fz.value,
   });
 
-  /** The axes of this case, in the units that were typed. */
-  function ownAxes(one) {
-    const size = sizes(one);
+  /** Those of the answer, null where it has no axes of its own on this map. */
+  function ownSizes() {
+    if (!answer?.groups || store.state.contact === "rigid") return null;
+    if (answer.state.direction !== map.direction) return null;
+    const size = sizes(answer);
+    return size.v0 > 0 && size[inputsOf(answer.state)[3]] > 0 ? size : null;
+  }
+
+  /** The axes of this case, in the units that were typed; 0 has that of the axis. */
+  function ownAxes(one, size) {
     const axis = (name, { start, stop, log }) => {
-      const unit = unitAt(name, one.inputs[name].value, one.inputs[name].unit);
+      const unit = unitAt(name, one.inputs[name].value || size[name], one.inputs[name].unit);
       const domain = [start, stop].map((end) => toUnit(name, end * size[name], unit));
       return { domain, log, title: `${about.inputs[name].symbol} [${inPrint(unit)}]` };
     };
     const up = inputsOf(one.state)[3];
-    if (!(size.v0 > 0 && size[up] > 0)) return;
     plot.outerAxes({ x: axis("v0", map.v_tilde), y: axis(up, map.y_tilde) });
   }
 
@@ -143,8 +183,7 @@ export function mapPanel(store, moved, loaded) {
   }
 
   /** The user's point, with a bar for its deviation or for the interval of k. */
-  function point({ v_tilde: v, y_tilde: y }, inputs) {
-    const [along, up] = [v ?? Infinity, y ?? Infinity];
+  function point({ v: along, y: up }, inputs) {
     const [dv, dy] = [SPEED, AMPLITUDE[amplitude()]].map((names) => deviationOf(inputs, names));
     if (dv) plot.bar([along * Math.exp(-dv), up], [along * Math.exp(dv), up]);
     if (dy && map.y_tilde.log) plot.bar([along, up * Math.exp(-dy)], [along, up * Math.exp(dy)]);
@@ -160,11 +199,11 @@ export function mapPanel(store, moved, loaded) {
     if (store.state.contact === "rigid")
       return "A rigid contact has no point on this map: ṽ and ỹ are infinite.";
     if (!answer?.groups || !map) return "";
-    const { v_tilde: v, y_tilde: y } = answer.groups;
-    const beyond = (value, { start, stop }) => value === null || value < start || value > stop;
+    const { v, y } = placeOf(answer);
+    const beyond = (value, { start, stop }) => value < start || value > stop;
     const names = [
-      beyond(v, map.v_tilde) && `ṽ = ${show(v ?? Infinity, 3)}`,
-      beyond(y, map.y_tilde) && !(y === 0 && !map.y_tilde.log) && `ỹ = ${show(y ?? Infinity, 3)}`,
+      beyond(v, map.v_tilde) && `ṽ = ${show(v, 3)}`,
+      beyond(y, map.y_tilde) && `ỹ = ${show(y, 3)}`,
     ].filter(Boolean);
     return names.length ? `Outside of this map: ${names.join(", ")}.` : "";
   }
@@ -175,11 +214,10 @@ export function mapPanel(store, moved, loaded) {
     if (!map) return;
     const at = place && plot.holds(place) ? place : null;
     if (!at) {
-      const { v_tilde: v, y_tilde: y } = answer?.groups ?? {};
-      const middle = answer ? middleOf(answer) : "";
-      const whose = middle ? `At ${middle}` : "Your case";
+      const { v, y } = placeOf(answer) ?? {};
+      const middle = middleOf(answer?.inputs);
       const words = answer?.groups
-        ? `${whose}: ṽ = ${show(v ?? Infinity)}, ỹ = ${show(y ?? Infinity)}, ` +
+        ? `${middle ? `At ${middle}` : "Your case"}: ṽ = ${show(v)}, ỹ = ${show(y)}, ` +
           `µ/µ₀ = ${show(answer.mu_ratio)}`
         : "";
       const line = target ? `Dash-dotted line: µ/µ₀ = ${show(target)}.` : "";
@@ -188,10 +226,8 @@ export function mapPanel(store, moved, loaded) {
       return;
     }
     const [v, y] = [plot.x.invert(at[0]), plot.y.invert(at[1])];
-    const cell = (value, from, size, n) => Math.round(((value - from) / size) * (n - 1));
-    const column = cell(at[0], plot.box.x, plot.box.width, map.v_tilde.n);
-    const row = cell(plot.box.y + plot.box.height - at[1], 0, plot.box.height, map.y_tilde.n);
-    const ratio = map.mu_ratio[row * map.v_tilde.n + column] * map.unit;
+    const { box } = plot;
+    const ratio = ratioAt((at[0] - box.x) / box.width, 1 - (at[1] - box.y) / box.height);
     const there = `ṽ = ${show(v, 3)}, ỹ = ${show(y, 3)}, µ/µ₀ ≈ ${show(ratio, 3)}`;
     write("map-read", whole(`At the pointer: ${there}`));
   }
@@ -226,9 +262,13 @@ export function mapPanel(store, moved, loaded) {
     `${about.choices.contact[map.contact]}, ${about.choices.direction[map.direction]}`;
 
   let asked;
+  let framed = false; // whether the frame has room for the axes of a case
   return (latest, ratio) => {
     if (latest !== answer || ratio !== target) plot.remark();
     [answer, target] = [latest, ratio];
+    const own = Boolean(map && ownSizes());
+    if (own !== framed) plot.redraw();
+    framed = own;
     const { contact, direction } = caseOf(store.state);
     const kind = `${contact} ${direction}`;
     if (asked !== kind) {

@@ -160,7 +160,11 @@ export function motionPanel(store, moved) {
         "until a small disturbance has fallen to 1 %",
         motion.periods === null ? "∞: nothing slips" : show(motion.periods),
       ],
-      ["error ≈", "estimate of the numerical error of µ and of µ across", show(error, 2)],
+      [
+        "numerical error",
+        "estimate of the numerical error of µ and of µ across",
+        `≈ ${show(error, 2)}`,
+      ],
     ]);
   }
   const amount = (value, unit) => (value === null ? null : prefixed(value, unit));
@@ -226,7 +230,12 @@ export function motionPanel(store, moved) {
       faults.size && [...faults.keys()].every((name) => Object.hasOwn(PARTS, name.split(",")[0]));
     write("motion-status", refused && !atFields ? prose(refused) : "");
     const remarks = (motion?.remarks ?? []).filter((one) => !isDoubt(one));
-    const all = [withoutDeviations(), ...remarks.map(({ text }) => prose(text))].filter(Boolean);
+    const driven = motion?.mu_macro < -motion?.error_estimate;
+    const all = [
+      driven ? "µ is negative: the motion drives the body forward." : "",
+      withoutDeviations(),
+      ...remarks.map(({ text }) => prose(text)),
+    ].filter(Boolean);
     render(
       all.map((words) => html`<li>${words}</li>`),
       $("motion-doubt"),
@@ -254,7 +263,7 @@ export function motionPanel(store, moved) {
   }
 
   /** Says above a plot what it shows. */
-  const headed = (plot, words) => plot.text(words, plot.box.x, 14, "note", "start");
+  const headed = (plot, words) => plot.text(words, plot.box.x, 14, "note head", "start");
 
   /** The three forces over one period. */
   function paintForces() {

@@ -1,11 +1,14 @@
 // The number: µ, as large as the page has it, with its deviation or its interval; what of µ₀ is
 // left, and the regime, in words; one line of advice, and what it assumes below that.
+import { Channel } from "./ask.js";
 import { $, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
-import { inputsOf } from "./state.js";
+import { post } from "./service.js";
+import { caseAround, caseOf } from "./state.js";
 import {
   about,
   around,
+  called,
   capital,
   digitsWithin,
   friction,
@@ -16,7 +19,9 @@ import {
   percent,
   prose,
   show,
+  whole,
   withDeviation,
+  withEnds,
 } from "./words.js";
 
 const KNOWN = "k decides";
@@ -28,10 +33,9 @@ const symbolOf = (name) => about.inputs[name === "omega" ? "f" : name].symbol;
 export function headline(answer, all) {
   const { mu_macro: mu, std, error_bound: bound, mu_macro_low: low, mu_macro_high: high } = answer;
   if (high > low) {
-    const few = Math.max(digitsWithin(high, high - low) + 2, FEW); // so that the ends differ
-    const [from, to] = [low, high].map((end) =>
-      friction(end, all ? digitsWithin(end, bound) + 1 : few),
-    );
+    const [from, to] = all
+      ? [low, high].map((end) => friction(end, digitsWithin(end, bound) + 1))
+      : withEnds(low, high);
     return { value: `${from} to ${to}`, std: null };
   }
   if (all) {
@@ -43,28 +47,41 @@ export function headline(answer, all) {
   return { value, std: deviation };
 }
 
-/** The number in one line of a phone; the regime has room beside a value alone. */
-function shortOf(answer) {
+/** The number in one line of a phone, with what of µ₀ is left; or which fields to check. */
+function shortOf(answer, faults = []) {
+  if (faults.length) return `µ = –, check ${faults.map(called).join(", ")}`;
   const { value, std } = headline(answer, false);
-  if (std) return `µ = ${value} ± ${std}`;
-  return value.includes(" ") ? `µ = ${value}` : `µ = ${value}, ${inWords(answer.regime)}`;
+  return `µ = ${value}${std ? ` ± ${std}` : ""}, ${shareOf(answer)} left`;
 }
 
-/** What of µ₀ is left, in words; of an interval both ends. */
-export function remains({ mu_macro_low: low, mu_macro_high: high, mu_ratio: ratio, inputs }) {
+/** The share of µ₀ that is left: a value, or both ends of an interval. */
+function shareOf({ mu_macro_low: low, mu_macro_high: high, mu_ratio: ratio, inputs }) {
   const { value: mu0 } = inputs.mu0;
-  if (ratio === 0) return "Nothing of µ₀ is left";
   const [from, to] = (high > low ? [low / mu0, high / mu0] : [ratio, ratio]).map(percent);
-  if (from === to) return `${from === "100 %" ? "All" : to} of µ₀ is left`;
-  return `${from.replace(" %", "")} to ${to} of µ₀ is left`;
+  return from === to ? to : `${from.replace(" %", "")} to ${to}`;
 }
 
-/** The regime, and which share of a period the contact sticks; of an interval, at its middle. */
-function going(answer) {
-  const name = capital(inWords(answer.regime));
-  const middle = middleOf(answer);
-  if (middle) return `${name} at ${middle}`;
-  const stick = answer.stick_fraction;
+/** What of µ₀ is left, in words. */
+export function remains(answer) {
+  const share = shareOf(answer);
+  if (answer.mu_ratio === 0) return "Nothing of µ₀ is left";
+  return `${share === "100 %" ? "All" : share} of µ₀ is left`;
+}
+
+/** The regimes of an interval of k, and where one begins: a law over it. */
+function regimes({ regime, border }, unit) {
+  const [first, last] = [regime.at(0), regime.at(-1)].map(inWords);
+  const places = border.map(({ value }) => inUnit("k", value, unit)).join(" and ");
+  if (!border.length) return `${capital(first)} in the whole interval`;
+  if (border.length === 1) return `${capital(first)} below k = ${places}, ${last} above it`;
+  return `${capital(first)} to ${last}, with borders at k = ${places}`;
+}
+
+/** The regime, and which share of a period the contact sticks; of an interval, in its middle. */
+function going({ regime, stick_fraction: stick, inputs }) {
+  const name = capital(inWords(regime));
+  const middle = middleOf(inputs);
+  if (middle) return `${name} at ${middle}, the middle of the interval`;
   return stick > 0 && stick < 1 ? `${name}: sticks for ${percent(stick)} of each period` : name;
 }
 
@@ -80,9 +97,11 @@ function variance({ std_share: shares }) {
   const parts = Object.entries(shares ?? {}).filter(([, share]) => share >= 0.005);
   const words = parts
     .sort(([, a], [, b]) => b - a)
-    .map(([name, share]) => `${symbolOf(name)} ${Math.round(100 * share)} %`);
-  const origin = `The variance comes from ${words.join(", ")}`;
-  return words.length ? `${origin}; ± is one standard deviation.` : "";
+    .map(([name, share], i) => {
+      const much = `${Math.round(100 * share)} %`;
+      return `${much}${i ? "" : " of the variance"} from ${symbolOf(name)}`;
+    });
+  return words.length ? `${words.join(", ")}.` : "";
 }
 
 /** A remark in the page's signs; an interval of k is shown for this one. */
@@ -127,11 +146,12 @@ function sayings(answer) {
   const ends = [inputs.k.low, inputs.k.high].map((end) => inUnit("k", end, unit));
   const middle =
     high > low
-      ? `k from ${ends.join(" to ")}; µ = ${friction(mu, FEW)} at ${middleOf(answer)}.`
+      ? `k from ${ends.join(" to ")}; µ = ${friction(mu, FEW)} at ${middleOf(inputs)} ` +
+        "(geometric mean)."
       : "";
   const own = [
     { row: "interval", words: middle },
-    { row: "deviation", words: variance(answer) },
+    { row: "uncertainty", words: variance(answer) },
   ].filter(({ words }) => words);
   const known = rows.filter(({ row }) => row === KNOWN);
   const doubts = rows.filter(({ doubt }) => doubt);
@@ -139,27 +159,67 @@ function sayings(answer) {
 }
 
 export function numberPanel(store) {
+  let law, asked; // over an interval of k, for its regimes
+  const ends = new Channel(
+    (question) => post("v1/law", question),
+    (reply, question) => {
+      law = { reply, question: JSON.stringify(question) };
+      if (law.question === asked) write("regime", whole(regimes(reply, unit)));
+    },
+    () => {},
+  );
+  let unit; // of k, as it is typed
+  /** Asks for the regimes of an interval, and returns what is known of the case until then. */
+  function spread(answer) {
+    const { k } = answer.inputs;
+    if (!middleOf(answer.inputs)) return going(answer);
+    unit = k.unit ?? undefined;
+    const range = { along: "k", start: k.low, stop: k.high, points: 2, scale: "log" };
+    const question = { ...caseAround(answer.state, answer, "k"), ...range };
+    const words = JSON.stringify(question);
+    if (words !== asked && !store.dragged) {
+      asked = words;
+      ends.push(question);
+    }
+    return law?.question === words ? regimes(law.reply, unit) : going(answer);
+  }
+
+  /** What an earlier state has otherwise than that of the form, as its texts. */
+  function otherwise(state) {
+    const [before, now] = [caseOf(state), caseOf(store.state)];
+    const names = Object.keys(before).filter((name) => before[name] !== now[name]);
+    const text = (name) =>
+      about.inputs[name] ? `${symbolOf(name)} = ${before[name]}` : before[name];
+    return whole(names.map(text).join(", "));
+  }
+
   $("number").replaceChildren(); // what stands there until the first answer
   return (answer, trouble, old) => {
+    const faults = [...(trouble?.faults?.keys() ?? [])];
+    if (!store.dragged) write("shown", answer && old ? `Shown: ${otherwise(answer.state)}` : "");
     const reason = trouble?.text ? prose(trouble.text).replace(/[^.!?]$/, "$&.") : "";
     write("status", reason && old && trouble.calm ? `${reason} ${stays(answer, store)}` : reason);
     $("status").classList.toggle("bad", Boolean(trouble && !trouble.calm));
     for (const part of document.querySelectorAll(".result")) part.classList.toggle("old", old);
+    $("number").classList.toggle("none", !answer && Boolean(trouble) && !trouble.calm);
     if (!answer) {
       const none = trouble && !trouble.calm ? "–" : "…";
       render(html`<output id="mu" for="fields">${none}</output>`, $("number"));
+      write("short", faults.length ? shortOf(null, faults) : "");
       return;
     }
     const { value, std } = headline(answer, store.state.digits === "all");
     $("number").classList.toggle("long", value.length + (std ?? "").length / 2 > 12);
-    const deviation = std ? html`<wbr /><span id="std"> ± ${std}</span>` : nothing;
+    const deviation = std
+      ? html`<wbr /><span id="std"> ± ${std}</span> <span id="std-name">(1 std. dev.)</span>`
+      : nothing;
     render(html`<output id="mu" for="fields">${value}</output>${deviation}`, $("number"));
     write("share", remains(answer));
-    write("regime", going(answer));
-    write("short", shortOf(answer));
+    write("regime", whole(spread(answer)));
+    write("short", shortOf(answer, old ? faults : []));
     if (store.dragged) return; // words may grow, and would move the map that is dragged
     const [first, ...rest] = sayings(answer);
-    const said = ({ row, words }) => html`<b>${capital(row)}.</b> ${words}`;
+    const said = ({ row, words }) => html`<b>${capital(row)}.</b> ${whole(words)}`;
     render(first ? said(first) : nothing, $("advice"));
     $("advice").classList.toggle("doubt", Boolean(first?.doubt));
     for (const part of document.querySelectorAll("[data-of]"))

@@ -6,6 +6,8 @@ const { axisBottom, axisLeft, axisRight, axisTop, drag, scaleLinear, scaleLog, s
 
 const DIGIT = 7; // pixels of a figure beside an axis
 const NARROW = 240; // pixels of a frame, in which the name of a regime has a line for each word
+const RADIUS = 7; // pixels of the user's point
+const CAP = 5; // pixels of the cap of a bar, to either side
 const BAR = 40; // places of a bar, at which it may lie on a text
 const FINGER = 36; // pixels from the point, within which a finger takes it
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -57,19 +59,23 @@ function decades(scale, most) {
   );
 }
 
-/** An axis of d3 with ticks that suit its length, from the least one on. */
-function ticked(axis, scale, room, least = -Infinity) {
+/** An axis of d3 with ticks that suit its length. */
+function ticked(axis, scale, room) {
   const [from, to] = scale.range();
   const most = Math.max(2, Math.floor(Math.abs(to - from) / room));
   if (!scale.base) {
-    const values = scale.ticks(most).filter((value) => value >= least);
-    return axis.tickValues(values).tickFormat(scale.tickFormat(most));
+    return axis.tickValues(scale.ticks(most)).tickFormat(scale.tickFormat(most));
   }
   const whole = decades(scale, most);
   if (whole.length > 1) return axis.tickValues(whole).tickFormat(decade);
   const within = scale.ticks(most).filter((value) => /^[125]e/.test(value.toExponential()));
   return axis.tickValues(within).tickFormat((value) => String(Number(value.toPrecision(3))));
 }
+
+/** The shape of a circle. */
+export const circleAt = (x, y, radius) =>
+  `M${x - radius} ${y}a${radius} ${radius} 0 1 0 ${2 * radius} 0` +
+  `a${radius} ${radius} 0 1 0 ${-2 * radius} 0Z`;
 
 const scaleOf = ({ domain, log }) => (log ? scaleLog() : scaleLinear()).domain(domain);
 const plots = [];
@@ -128,18 +134,19 @@ export class Plot {
     [this.inside, this.over] = this.marks;
     for (const group of this.marks) group.selectAll("*").remove();
     this.covers = [];
+    this.open = false; // whether a bar is drawn
     this.mark(this);
     this.uncover();
   }
 
   /**
-   * Two axes with titles; so many pixels are left free above, to the right and below, `from` is
-   * the lowest tick.
+   * Two axes with titles, and where it is asked faint `lines` at the ticks of y; so many pixels are
+   * left free above, to the right and below.
    */
-  axes({ x, y, top = 10, right = 24, below = 0 }) {
+  axes({ x, y, top = 10, right = 24, below = 0, lines = false }) {
     const foot = 42 + below;
     this.y = scaleOf(y).range([this.height - foot, top]);
-    const side = ticked(axisLeft(this.y).tickSizeOuter(0), this.y, 44, y.from);
+    const side = ticked(axisLeft(this.y).tickSizeOuter(0), this.y, 44);
     const numbers = side.tickValues().map((value) => side.tickFormat()(value).length);
     const left = 56 + DIGIT * Math.max(0, ...numbers.map((length) => length - 4));
     this.box = {
@@ -163,6 +170,11 @@ export class Plot {
       .attr("width", box.width)
       .attr("height", box.height);
     this.inside = clipped();
+    for (const value of lines ? side.tickValues() : [])
+      this.path(
+        x.domain.map((end) => [end, value]),
+        "line",
+      );
     const bottom = root
       .append("g")
       .attr("class", "axis")
@@ -199,6 +211,22 @@ export class Plot {
     title(y.title, `translate(${this.width - 12} ${box.y + box.height / 2}) rotate(90)`);
   }
 
+  /**
+   * A strip below the axis of x, of so many pixels, with an axis of its own that has 0 in its
+   * middle; returns its scale.
+   */
+  strip({ most, title, pixels }) {
+    const { box, over, height } = this;
+    const scale = scaleLinear()
+      .domain([-1.2 * most, 1.2 * most])
+      .range([height - 6, height - pixels + 6]);
+    const axis = over.append("g").attr("class", "axis").attr("transform", `translate(${box.x} 0)`);
+    axis.call(ticked(axisLeft(scale).tickSizeOuter(0), scale, 30));
+    over.append("path").attr("class", "rule").attr("d", `M${box.x} ${scale(0)}h${box.width}`);
+    this.text(title, box.x, height - pixels - 8, "note", "start");
+    return scale;
+  }
+
   /** An empty plot. */
   clear() {
     this.svg.replaceChildren();
@@ -224,10 +252,10 @@ export class Plot {
   }
 
   /** The name of a regime about a place, with two lines where the frame is narrow. */
-  area(words, x, y) {
+  area(words, x, y, className) {
     const last = words.lastIndexOf(" ");
-    if (this.box.width >= NARROW || last < 0) return this.text(words, x, y, "area");
-    const text = this.text("", x, y, "area");
+    if (this.box.width >= NARROW || last < 0) return this.text(words, x, y, className);
+    const text = this.text("", x, y, className);
     for (const [i, line] of [words.slice(0, last), words.slice(last + 1)].entries())
       text
         .append("tspan")
@@ -277,13 +305,18 @@ export class Plot {
       text.classList.toggle("covered", left || this.covers.some((one) => overlap(place, one)));
   }
 
-  /** A bar for what is open about the user's point, from one place to another. */
+  /** A bar with caps for what is open about the user's point, from one place to another. */
   bar(from, to) {
     const ends = [from, to].map(([x, y]) => [this.x(x), this.y(y)]);
     const [[left, foot], [right, top]] = ends;
     for (let i = 0; i <= BAR; i += 1)
       this.cover(left + (i / BAR) * (right - left), foot + (i / BAR) * (top - foot), 3);
-    this.rimmed(this.shape([from, to]), "deviation");
+    const length = Math.hypot(right - left, top - foot) || 1;
+    const [across, down] = [foot - top, right - left].map((one) => (CAP * one) / length);
+    const shown = length > 2 * RADIUS ? ends : []; // within the point there is no room
+    const cap = ([x, y]) => `M${x - across} ${y - down}L${x + across} ${y + down}`;
+    this.rimmed(`${this.shape([from, to])}${shown.map(cap).join("")}`, "deviation");
+    this.open = true;
   }
 
   /** Notes that something of the upper layer is drawn here. */
@@ -291,7 +324,8 @@ export class Plot {
     this.covers.push([x - half, y - half, x + half, y + half]);
   }
 
-  /** The user's point; where it is outside, an arrow on the frame that points to it. */
+  /** The user's point, hollow about its bar; where it is outside, an arrow on the frame that points
+   * to it. */
   point(x, y) {
     const { box } = this;
     const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
@@ -311,8 +345,8 @@ export class Plot {
     const turn = (Math.atan2(down, right) * 180) / Math.PI;
     return this.over
       .append("path")
-      .attr("class", "point")
-      .attr("d", outside ? "M0 0L-18 -10L-18 10Z" : "M-7 0a7 7 0 1 0 14 0a7 7 0 1 0 -14 0Z")
+      .attr("class", `point${this.open && !outside ? " open" : ""}`)
+      .attr("d", outside ? "M0 0L-18 -10L-18 10Z" : circleAt(0, 0, RADIUS))
       .attr("transform", `translate(${place}) rotate(${turn})`);
   }
 

@@ -15,6 +15,17 @@ function together(errors) {
     .join("; ");
 }
 
+/** A fault of a number: that it has to be finite is no news of one that is. */
+const ofNumber = (fault) =>
+  typeof fault.value === "number"
+    ? {
+        ...fault,
+        reason: fault.reason
+          .replace("finite and > 0", "greater than 0")
+          .replace("finite and >= 0", "0 or greater"),
+      }
+    : fault;
+
 async function ask(path, options) {
   let response, body;
   try {
@@ -22,13 +33,14 @@ async function ask(path, options) {
     body = await response.json();
   } catch (error) {
     if (!response || error.name === "TimeoutError")
-      return { later: "The service does not answer." };
+      return { later: "No answer from the service." };
     return { later: `The response of the service cannot be read (status ${response.status}).` };
   }
   if (response.ok) return { answer: body };
   const { status, headers } = response;
   if (status === 401) return { key: true };
-  const { errors = [], inputs = {} } = body;
+  const { errors: all = [], inputs = {} } = body;
+  const errors = all.map(ofNumber);
   const detail = together(errors) || (body.detail ?? `status ${status}`);
   if (status < 500 && ![408, 429].includes(status))
     return { refused: detail, faults: errors, inputs };

@@ -67,6 +67,13 @@ function numbers(answer, all) {
   const without = (name, words) =>
     lacks[name] ? [words, lacks[name]] : ["rigid contact", "it is not given for a rigid contact"];
   const amplitude = inputs.y0?.value;
+  // the service has no group that is not finite, nor ṽ where nothing oscillates
+  const still = groups.y_tilde === 0;
+  const group = (name) => {
+    const value = groups[name] ?? (still ? null : Infinity);
+    return value === null ? null : show(value, digits);
+  };
+  const why = ["not shaken", "it is not given where nothing oscillates"];
   const amount = (value, unit, some = digits) =>
     value === null || value === undefined ? null : prefixed(value, unit, some);
   return [
@@ -108,13 +115,9 @@ function numbers(answer, all) {
       settling === undefined ? null : show(settling.periods ?? Infinity, digits),
       ...without("settling", "across only"),
     ],
-    ["error ≤", "bound of the numerical error of µ", show(answer.error_bound, 2)],
-    ["ṽ", "v₀/(l₀ω), dimensionless speed", show(groups.v_tilde ?? Infinity, digits)],
-    [
-      "ỹ",
-      inputs.y0 ? "y₀/l₀, dimensionless amplitude" : "ΔFz/Fz",
-      show(groups.y_tilde ?? Infinity, digits),
-    ],
+    ["numerical error", "at most, of µ", `≤ ${show(answer.error_bound, 2)}`],
+    ["ṽ", "v₀/(l₀ω), dimensionless speed", group("v_tilde"), ...why],
+    ["ỹ", inputs.y0 ? "y₀/l₀, dimensionless amplitude" : "ΔFz/Fz", group("y_tilde"), ...why],
     [
       "l₀",
       "µ₀Fz/k: how far the contact is drawn before it slips",
@@ -272,6 +275,8 @@ export function sidePanel(store, moved, found) {
     for (const id of ["values", "bars"]) if (!answer) render(NONE_YET, $(id));
     document.querySelector("[data-meanings=values]").disabled = !answer;
     if (!answer) return;
+    const middle = middleOf(answer.inputs);
+    write("values-at", middle ? `At ${middle}, the middle of the interval:` : "");
     const origin = `All are from the block ${answer.source} of the table ${answer.table.id}.`;
     const middle = middleOf(answer);
     write("middle", middle && `At ${middle}, the middle of the interval.`);

@@ -18,6 +18,7 @@ const CHOICES = {
   direction: ["across", "along", "normal"],
   along: ["v0", "mu0", "Fz", "k", "y0", "Fz_amplitude", "f"],
   scale: ["log", "linear"],
+  axis: ["fit", "zero"], // of µ in the law
   digits: ["few", "all"],
   unknown: ["y0", "mu0", "Fz", "k", "Fz_amplitude", "f", "v0"],
   quantity: ["mu_ratio", "mu_macro"],

@@ -136,13 +136,18 @@ export function stiffnessPanel(store, moved) {
       Object.assign(typed, { [E]: one.E, [nu]: one.nu });
       ask(false);
     };
-    const same = number === 2 && !typed.E2?.trim();
+    const none = !typed[E]?.trim();
+    const chosen = about.materials.rows.find((one) => one.E === typed[E] && one.nu === typed[nu]);
+    const words = number === 2 && none ? "as body 1" : none ? "choose a material" : "own values";
     return html`<div class="field wide">
       <label for=${`material-${number}`}>body ${number}</label>
       <select id=${`material-${number}`} @change=${take}>
-        <option value="">${same ? "as body 1" : "choose a material"}</option>
+        <option value="" ?selected=${!chosen}>${words}</option>
         ${about.materials.rows.map(
-          ({ name, E: modulus }) => html`<option value=${name}>${name}, ${modulus}</option>`,
+          ({ name, E: modulus }) =>
+            html`<option value=${name} ?selected=${name === chosen?.name}>
+              ${name}, ${modulus}
+            </option>`,
         )}
       </select>
     </div>`;
