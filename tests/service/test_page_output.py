@@ -102,12 +102,12 @@ def test_what_holds_at_the_middle_of_an_interval_names_it(open_page: Any) -> Non
         "#regime", r"^Continuous sliding below k = 0\.1197 N/.?µm, stick and slip above it$"
     )
     assert "µ = 0.2405 at k = 1 N/" in page.text("#advice")
-    for place in ("#values-at", "#map-read", "#law-read"):
+    for place in ("#middle", "#map-read", "#law-read"):
         assert "k = 1 N/" in page.text(place), place
     page.type("#field-k", "0.9..1.1 N/um")
     page.wait_for("#regime", "^Stick and slip in the whole interval$")
     page.type("#field-k", "1 N/um")
-    assert page.text("#values-at") == ""
+    assert page.text("#middle") == ""
     assert page.text("#map-read").startswith("Your case: ")
 
 

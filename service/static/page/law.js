@@ -236,7 +236,7 @@ export function lawPanel(store, moved) {
     if (!law) return;
     if (!place || !plot.box || !plot.holds(place)) {
       const one = numberOf(answer?.inputs[law.along]);
-      const middle = middleOf(answer?.inputs);
+      const middle = answer ? middleOf(answer) : "";
       const where = middle && law.along !== "k" ? ` and ${middle}` : "";
       const words =
         one === undefined

@@ -215,7 +215,7 @@ export function mapPanel(store, moved, loaded) {
     const at = place && plot.holds(place) ? place : null;
     if (!at) {
       const { v, y } = placeOf(answer) ?? {};
-      const middle = middleOf(answer?.inputs);
+      const middle = answer ? middleOf(answer) : "";
       const words = answer?.groups
         ? `${middle ? `At ${middle}` : "Your case"}: ṽ = ${show(v)}, ỹ = ${show(y)}, ` +
           `µ/µ₀ = ${show(answer.mu_ratio)}`

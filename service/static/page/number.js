@@ -78,18 +78,12 @@ function regimes({ regime, border }, unit) {
 }
 
 /** The regime, and which share of a period the contact sticks; of an interval, in its middle. */
-function going({ regime, stick_fraction: stick, inputs }) {
-  const name = capital(inWords(regime));
-  const middle = middleOf(inputs);
+function going(answer) {
+  const name = capital(inWords(answer.regime));
+  const middle = middleOf(answer);
   if (middle) return `${name} at ${middle}, the middle of the interval`;
+  const stick = answer.stick_fraction;
   return stick > 0 && stick < 1 ? `${name}: sticks for ${percent(stick)} of each period` : name;
-}
-
-/** Which case the last answer is of, where that is another one now. */
-function stays({ state }, store) {
-  const other = inputsOf(state).filter((name) => state[name] !== store.state[name]);
-  const words = other.map((name) => `${symbolOf(name)} = ${state[name]}`).join(", ");
-  return `The last answer stays${words && `, of ${words}`}.`;
 }
 
 /** Where the deviation of the number comes from. */
@@ -146,7 +140,7 @@ function sayings(answer) {
   const ends = [inputs.k.low, inputs.k.high].map((end) => inUnit("k", end, unit));
   const middle =
     high > low
-      ? `k from ${ends.join(" to ")}; µ = ${friction(mu, FEW)} at ${middleOf(inputs)} ` +
+      ? `k from ${ends.join(" to ")}; µ = ${friction(mu, FEW)} at ${middleOf(answer)} ` +
         "(geometric mean)."
       : "";
   const own = [
@@ -172,7 +166,10 @@ export function numberPanel(store) {
   /** Asks for the regimes of an interval, and returns what is known of the case until then. */
   function spread(answer) {
     const { k } = answer.inputs;
-    if (!middleOf(answer.inputs)) return going(answer);
+    if (!middleOf(answer)) {
+      asked = null;
+      return going(answer);
+    }
     unit = k.unit ?? undefined;
     const range = { along: "k", start: k.low, stop: k.high, points: 2, scale: "log" };
     const question = { ...caseAround(answer.state, answer, "k"), ...range };
@@ -198,7 +195,7 @@ export function numberPanel(store) {
     const faults = [...(trouble?.faults?.keys() ?? [])];
     if (!store.dragged) write("shown", answer && old ? `Shown: ${otherwise(answer.state)}` : "");
     const reason = trouble?.text ? prose(trouble.text).replace(/[^.!?]$/, "$&.") : "";
-    write("status", reason && old && trouble.calm ? `${reason} ${stays(answer, store)}` : reason);
+    write("status", reason && old && trouble.calm ? `${reason} The last answer stays.` : reason);
     $("status").classList.toggle("bad", Boolean(trouble && !trouble.calm));
     for (const part of document.querySelectorAll(".result")) part.classList.toggle("old", old);
     $("number").classList.toggle("none", !answer && Boolean(trouble) && !trouble.calm);

@@ -275,8 +275,6 @@ export function sidePanel(store, moved, found) {
     for (const id of ["values", "bars"]) if (!answer) render(NONE_YET, $(id));
     document.querySelector("[data-meanings=values]").disabled = !answer;
     if (!answer) return;
-    const middle = middleOf(answer.inputs);
-    write("values-at", middle ? `At ${middle}, the middle of the interval:` : "");
     const origin = `All are from the block ${answer.source} of the table ${answer.table.id}.`;
     const middle = middleOf(answer);
     write("middle", middle && `At ${middle}, the middle of the interval.`);

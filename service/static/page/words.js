@@ -127,12 +127,6 @@ export function percent(share) {
 export const digitsWithin = (value, bound) =>
   value && bound ? Math.max(Math.min(Math.floor(Math.log10(Math.abs(value) / bound)), 15), 1) : 15;
 
-/** The k in an interval at which all values but the ends of µ hold; empty where k is one value. */
-export function middleOf({ k } = {}) {
-  if (!(k?.high > k?.low)) return "";
-  return `k = ${inUnit("k", k.value, k.unit ?? undefined)}`;
-}
-
 /** Both ends of an interval of friction, to the third digit of its width. */
 export function withEnds(low, high) {
   const places = Math.min(Math.max(2 - Math.floor(Math.log10(high - low)), 0), 15);
