@@ -63,7 +63,7 @@ def test_a_deviation_stands_beside_the_number(open_page: Any, surrogate: Surroga
     deviation = math.hypot(0.02 * answer.gradient["mu0"], 1e5 * answer.gradient["k"])
     assert float(page.text("#std").removeprefix(" ± ")) == close(deviation, rel=0.05)
     assert page.number() == close(answer.mu_macro, abs=10.0 ** math.floor(math.log10(deviation)))
-    assert re.search("µ₀ .* k|k .* µ₀", page.text("#advice"))
+    assert re.search("µ₀, .* k|k, .* µ₀", page.text("#advice"))
     assert len(page.texts("#map .deviation")) == 2
     assert len(page.texts("#law .deviation")) == 1
     # one that is not small is doubted, and its origin still told
