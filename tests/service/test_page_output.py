@@ -197,9 +197,10 @@ def test_the_line_of_a_target_strikes_out_no_text(open_page: Any) -> None:
     page.click("#solve-form button")
     order = page.run(
         "return [...document.querySelectorAll('#map :is(.target, .tag, .area, .point)')]"
-        ".map((one) => one.getAttribute('class'));"
+        ".map((one) => one.classList[0]);"
     )
     assert (order[0], order[-1]) == ("target", "point")
+    assert page.texts("#map .target-number") == ["0.5"]
     assert {*order[1:-1]} == {"tag", "area"}
 
 

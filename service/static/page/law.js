@@ -166,7 +166,7 @@ export function lawPanel(store, moved) {
     nameStatic(places);
   }
 
-  /** Names the dotted line where it is farthest from the curve, below it or above. */
+  /** Names the dotted line where it is about as far from the curve as anywhere, to the right. */
   function nameStatic(places) {
     const { box } = plot;
     const away = law.mu_static.map((mu, i) => Math.abs(plot.y(mu) - plot.y(law.mu_macro[i])));
@@ -174,7 +174,7 @@ export function lawPanel(store, moved) {
       const x = plot.x(places[i]) - box.x;
       return x > 40 && x < box.width - 40 ? far : -1;
     });
-    const i = inner.indexOf(Math.max(...inner));
+    const i = inner.findLastIndex((far) => far >= 0.9 * Math.max(...inner));
     const [x, y] = [plot.x(places[i]), plot.y(law.mu_static[i])];
     const foot = box.y + box.height;
     const below = law.mu_static[i] <= law.mu_macro[i] ? y + 14 < foot : y - 14 < box.y;
@@ -243,8 +243,7 @@ export function lawPanel(store, moved) {
           ? ""
           : `${middle ? "At" : "Your case:"} ${text(one)}${where}, ` +
             `µ = ${middle ? friction(answer.mu_macro, 4) : number(answer)}`;
-      const scale = colours && law.along !== "mu0" ? " Colours: as on the map." : "";
-      write("law-read", whole(words && `${words}.${scale}`));
+      write("law-read", whole(words));
       return;
     }
     const i = bisectCenter(law.values, toSI(law.along, plot.x.invert(place[0]), unit()));

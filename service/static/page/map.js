@@ -118,8 +118,9 @@ export function mapPanel(store, moved, loaded) {
   function numbered({ coordinates }) {
     const { box } = plot;
     const places = coordinates.flat(2).map(onPlot);
+    const [right, foot] = [box.x + 0.9 * box.width, box.y + box.height - 9];
     const [x, y] = places
-      .filter(([x, y]) => x < box.x + 0.9 * box.width && y > box.y + 20 && y < box.y + box.height - 9)
+      .filter(([x, y]) => x < right && y > box.y + 20 && y < foot)
       .reduce((best, one) => (one[0] > best[0] ? one : best), [-Infinity, 0]);
     if (x > box.x) plot.text(show(target), x + 8, y + 4, "tag target-number", "start");
   }
