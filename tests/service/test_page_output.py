@@ -369,9 +369,9 @@ def test_k_grows_with_the_load_along_fz(
                 surrogate.evaluate(**grown).mu_macro, rel=1e-9
             )
         page.type("#exponent", "1.5")
-        page.wait_for("#law-status", "^m: ")
+        page.wait_for("#law-status", "^m:? ")
         page.type("#exponent", "half")
-        page.wait_for("#law-status", "^m: ")
+        page.wait_for("#law-status", "^m:? ")
         page.type("#exponent", "")
         page.click("[name=contact][value=ball]")
         question = page.question("v1/law")

@@ -213,6 +213,7 @@ export function numberPanel(store) {
     render(html`<output id="mu" for="fields">${value}</output>${deviation}`, $("number"));
     write("share", remains(answer));
     write("regime", whole(spread(answer)));
+    $("regime").classList.toggle("two", middleOf(answer) !== "");
     write("short", shortOf(answer, old ? faults : []));
     if (store.dragged) return; // words may grow, and would move the map that is dragged
     const [first, ...rest] = sayings(answer);
