@@ -9,8 +9,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 import pyarrow as pa
 
-from mumacro.files import reading
-from mumacro.files.reading import ParquetSource, RowBlock, TextSource, lines_of
+from mumacro.files import sources
 from mumacro.files.record_batch import (
     REJECTS,
     FilesError,
@@ -20,6 +19,7 @@ from mumacro.files.record_batch import (
     kind_of_batch,
     names_of_columns,
 )
+from mumacro.files.sources import ParquetSource, RowBlock, TextSource, lines_of
 from mumacro.files.writing import OutputFormat, csv_lines, written_as
 from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import KIND
@@ -127,10 +127,10 @@ class _Run:
         kind: Kind,
         say: Callable[[str], None],
     ) -> None:
-        self.files, input_format = reading.find_files(cases, say)
-        output_format, is_compressed = reading.format_of(out)
+        self.files, input_format = sources.find_files(cases, say)
+        output_format, is_compressed = sources.format_of(out)
         if not output_format or out.is_dir():
-            raise FilesError(f"{out}: must be the name of a file that ends in {reading.ENDINGS}")
+            raise FilesError(f"{out}: must be the name of a file that ends in {sources.ENDINGS}")
         self.out, self.rejects = out, out.with_name(f"{out.name}.rejects.csv")
         for output in (self.out, self.rejects):
             if output.exists() and any(output.samefile(path) for path in self.files):
@@ -155,7 +155,7 @@ class _Run:
         self.columns = find_columns(names, rigid, include, kind, where, units)
         headings = self.columns.headings
         sep, decimal = written_as(
-            reading.ending_of(out), self.source.sep, self.source.decimal, dialect
+            sources.ending_of(out), self.source.sep, self.source.decimal, dialect
         )
         self.output = OutputFormat(
             output_format, is_compressed, sep, decimal, headings.get("k", (None,))[0]

@@ -143,7 +143,7 @@ class Account:
         may_be_units = all(not starts_as_number(cell) or cell == "1" for cell in filled)
         if may_be_units and self.units.take_row(line, text, self._remedy_of_units(line), True):
             return self._skip(line, again=self.first is not None)
-        if not any(map(may_be_value, filled or [first])):
+        if not self._holds_values(cells, filled):
             shown = " ".join(text.split())[:60]
             remedy = self.remedy(line)
             raise TextError(f"line {line}: {shown!r} is neither a row nor a comment: {remedy}")
@@ -151,6 +151,14 @@ class Account:
             self.first = line
         self.units.rows_begun = True
         return True
+
+    def _holds_values(self, cells: Sequence[str], filled: Sequence[str]) -> bool:
+        """Return whether some of the ``filled`` cells of inputs may be a value; a row without any
+        is one with gaps if it is whole, and more than a title."""
+        if filled:
+            return any(map(may_be_value, filled))
+        texts = [*filter(None, cells)]
+        return may_be_value(texts[0]) or (len(cells) == self.width and len(texts) > 1)
 
     def _skip(self, line: int, again: bool = False) -> bool:
         """Account for a line that is no row."""

@@ -222,8 +222,9 @@ def _doubtful(
     if not ends.size:
         return []
     signs = np.frombuffer(data, np.uint8)
-    before = np.searchsorted(seps, starts)
-    is_doubtful = np.searchsorted(seps, ends) - before != account.width - 1
+    until = np.searchsorted(seps, ends)  # so many stand before the end of each row
+    before = np.concatenate([[0], until[:-1]])
+    is_doubtful = until - before != account.width - 1
     place = min(account.units.inputs, default=0)
     first = starts
     if place and seps.size:  # a name stands first: what matters is the first cell of an input, too
@@ -288,9 +289,11 @@ class TextTable:
         return self._said + described + headers_left_out(self.account.repeated)
 
     def find_signs(self) -> None:
-        """Look for the signs of numbers in the first rows, and then in the first pieces."""
+        """Look for the signs of numbers in the first rows, and then in the first pieces; not where
+        columns are missing, as that is what is to be said."""
+        is_known = self._column_names.are_all_in(self.layout.heads)
         for last in (self.layout.first + _AT_ONCE, None):
-            if not self.signs.decimal:
+            if is_known and not self.signs.decimal:
                 for rows in self._rows_of(self._start, last):
                     self.see_signs(rows)
         self._start = []

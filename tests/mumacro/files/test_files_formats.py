@@ -20,7 +20,7 @@ pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 import pyarrow.parquet as pq  # noqa: E402
 
 from mumacro.cli.main import main  # noqa: E402
-from mumacro.files import ANSWERS, evaluate_files, reading  # noqa: E402
+from mumacro.files import ANSWERS, evaluate_files, sources  # noqa: E402
 from mumacro.inputs import decoding  # noqa: E402
 from tests.support.forms import as_csv  # noqa: E402
 
@@ -85,7 +85,7 @@ def ran(capsys: Capture, code: Any, *words: Any) -> Any:
 def test_every_format_goes_into_all(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, start: Any, end: Any
 ) -> None:
-    monkeypatch.setattr(reading, "ROWS", 70)  # several blocks
+    monkeypatch.setattr(sources, "ROWS", 70)  # several blocks
     monkeypatch.setattr(decoding, "PIECE", 5000)
     inputs = cases(300)
     source, out = write(inputs, tmp_path / f"cases.{start}"), tmp_path / f"out.{end}"

@@ -20,7 +20,7 @@ pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 import pyarrow.parquet as pq  # noqa: E402
 
 from mumacro.cli.main import main  # noqa: E402
-from mumacro.files import FilesError, evaluate_files, reading  # noqa: E402
+from mumacro.files import FilesError, evaluate_files, sources  # noqa: E402
 from mumacro.inputs import decoding  # noqa: E402
 from mumacro.table import atomic  # noqa: E402
 
@@ -31,7 +31,7 @@ KINDS = ("csv", "csv.gz", "parquet")
 @pytest.fixture(scope="module", autouse=True)
 def small_blocks() -> Any:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(reading, "ROWS", 400)
+        patch.setattr(sources, "ROWS", 400)
         patch.setattr(decoding, "PIECE", 20_000)
         yield
 
@@ -138,7 +138,7 @@ def test_a_stopped_process_leaves_what_was_there(
         out.write_bytes(older)
     # it says when half of the input is read, and waits
     program = (
-        "import sys, time; from mumacro.files import reading, run; reading.ROWS = 400\n"
+        "import sys, time; from mumacro.files import sources, run; sources.ROWS = 400\n"
         "from mumacro.cli import eval as command\n"
         "def evaluate(*words, progress, **options):\n"
         "    def wait(share, *counts):\n"
@@ -170,7 +170,7 @@ def test_a_full_disk_is_told_and_leaves_what_was_there(
     if older:
         out.write_bytes(older)
     program = (
-        "import resource, sys; from mumacro.files import reading; reading.ROWS = 400; "
+        "import resource, sys; from mumacro.files import sources; sources.ROWS = 400; "
         "from mumacro.cli.main import main; resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, "
         f"200_000)); sys.exit(main(['eval', {str(source)!r}, '-o', {str(out)!r}, '--force']))"
     )

@@ -286,6 +286,20 @@ def test_a_head_of_a_hundred_thousand_columns(tmp_path: Path, capsys: Capture) -
     assert len(capsys.readouterr().err) < 2000
 
 
+def test_a_row_without_a_value_is_rejected_and_the_run_goes_on(tmp_path: Path) -> None:
+    row = ROWS.splitlines()[0]
+    text = f"name,note,{HEAD}\na,b,{row}\nc,d{',' * 6}\n7{',' * 7}\ne,f,{row}\n"
+    (tmp_path / "cases.csv").write_text(text)
+    summary = evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
+    assert (summary.answered, summary.rejected) == (2, 2)
+
+
+def test_a_column_that_is_missing_is_told_before_what_is_wrong_with_a_row(tmp_path: Path) -> None:
+    (tmp_path / "cases.csv").write_text(f"{HEAD.replace('v0', 'w0')}\n{ROWS}Mean,10,1,1,1,1\n")
+    with pytest.raises(FilesError, match="line 1: there is no column v0"):
+        evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
+
+
 def test_the_decimal_sign_may_show_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(decoding, "PIECE", 100)
     row = "1;10;1000000;1;20000;1\n"
