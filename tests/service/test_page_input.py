@@ -615,7 +615,7 @@ def test_every_trouble_of_the_service_has_its_own_message(
     with open_page.faked("(...all) => (window.reply ?? real)(...all)") as page:
         before = page.number()
         for reply, message, red in (
-            (f"async () => {answer % 503}", "cannot answer now: too many cases. Asking", False),
+            (f"async () => {answer % 503}", "cannot answer now: too many cases. Retrying", False),
             (f"async () => {answer % 422}", "^too many cases", True),
             (
                 "async () => new Response('<html>', { status: 200 })",

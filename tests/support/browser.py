@@ -72,6 +72,11 @@ def start(folder: Path) -> Any:
     return browser
 
 
+def plain(text: str) -> str:
+    """Return a text without what keeps its equations on one line."""
+    return text.replace("\N{NO-BREAK SPACE}", " ").replace("\N{WORD JOINER}", "")
+
+
 class Opened:
     """Opens a state of the page by its address, each time in a new document."""
 
@@ -164,13 +169,12 @@ class Page:
 
     def text(self, selector: str) -> Any:
         """The text of an element, without what keeps its equations on one line."""
-        text = self.run(f"return document.querySelector({selector!r}).textContent;")
-        return text.replace("\N{NO-BREAK SPACE}", " ").replace("\N{WORD JOINER}", "")
+        return plain(self.run(f"return document.querySelector({selector!r}).textContent;"))
 
     def texts(self, selector: str) -> Any:
-        return self.run(
-            f"return [...document.querySelectorAll({selector!r})].map((one) => one.textContent);"
-        )
+        """Those of all elements, likewise."""
+        all_ = f"return [...document.querySelectorAll({selector!r})].map((one) => one.textContent);"
+        return [plain(text) for text in self.run(all_)]
 
     def number(self, selector: str = "#mu") -> Any:
         return float(self.text(selector).replace("−", "-"))
