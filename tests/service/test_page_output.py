@@ -176,8 +176,8 @@ def test_the_law_has_a_unit_in_which_its_ends_read(open_page: Any, speed: str) -
 def test_bars_and_sentence_have_the_same_shares_of_the_variance(open_page: Any) -> None:
     page = open_page("#mu0=0.3 ± 0.02&k=1 ± 0.1 N/um&f=20 ± 4 kHz")
     page.click("#tab-bars")
-    told = page.text("#advice").removeprefix("Uncertainty. ").replace(" of the variance", "")
-    parts = [part.split(" % from ") for part in told.rstrip(".").split(", ")]
+    told = page.text("#advice").removeprefix("Uncertainty. ").partition(";")[0]
+    parts = [part.split(" % from ") for part in told.replace(" of the variance", "").split(", ")]
     sentence = {name: share for share, name in parts}
     names = [name.strip() for name in page.texts("#bars tbody th")]
     bars = dict(zip(names, page.texts("#bars .variance"), strict=True))

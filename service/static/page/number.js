@@ -95,7 +95,8 @@ function variance({ std_share: shares }) {
       const much = `${Math.round(100 * share)} %`;
       return `${much}${i ? "" : " of the variance"} from ${symbolOf(name)}`;
     });
-  return words.length ? `${words.join(", ")}.` : "";
+  const origin = `${words.join(", ")}; ± is one standard deviation.`;
+  return words.length ? origin : "";
 }
 
 /** A remark in the page's signs; an interval of k is shown for this one. */
