@@ -27,7 +27,8 @@ kinds = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: "-".join(kind.na
 
 @pytest.fixture(autouse=True)
 def closed() -> Iterator[None]:
-    """No figure outlives its test."""
+    """No figure outlives its test, and none of another file is there."""
+    pyplot.close("all")
     yield
     pyplot.close("all")
 

@@ -163,13 +163,13 @@ def find_columns(
     >>> find_columns(["mu0", "Fz [kN]", "k", "y0", "f", "v0", "note"]).headings["Fz"]
     ('Fz [kN]', Scale(times=1000.0, over=1.0))
     """
-    like = {name: MEASURED_AS.get(name, name) for name in (*ALL_FIELDS, "f", *ENDS)}
-    like |= {column: MEASURED_AS.get(name, name) for column, name in DEVIATIONS.items()}
+    quantities = {name: MEASURED_AS.get(name, name) for name in (*ALL_FIELDS, "f", *ENDS)}
+    quantities |= {column: MEASURED_AS.get(name, name) for column, name in DEVIATIONS.items()}
     units = units or {}
-    heads, faults = find_heads([_with_unit(name, units.get(name)) for name in names], like)
+    heads, faults = find_heads([_with_unit(name, units.get(name)) for name in names], quantities)
     for name, (i, scale) in heads.items():
         unit = units.get(names[i])
-        if unit and scale_of(like[name], unit) not in (scale, None):
+        if unit and scale_of(quantities[name], unit) not in (scale, None):
             faults.append(f"the column {names[i]!r} has another unit in its field: {unit}")
     words = [name for name in KIND if name in names]
     all_names = {*heads, *words}
@@ -205,7 +205,8 @@ def find_columns(
     ]
     if faults:
         raise FilesError(where + "; ".join(faults))
-    headings = {name: (names[heads[name][0]], heads[name][1]) for name in like if name in heads}
+    found = [name for name in quantities if name in heads]
+    headings = {name: (names[heads[name][0]], heads[name][1]) for name in found}
     return Columns(headings, words, kind, tuple(include), answer_names)
 
 
@@ -247,11 +248,11 @@ def kind_of_batch(batch: pa.RecordBatch, kind: Kind, where: str = "") -> Kind:
 def names_of_columns(rigid: bool = False) -> ColumnNames:
     """Return the columns that a table of cases may have, and those that it needs."""
     names = [*SI, *MEASURED_AS]
-    like = {name: MEASURED_AS.get(name, name) for name in names}
-    like |= {f"std_{name}": unit for name, unit in like.items()}
+    quantities = {name: MEASURED_AS.get(name, name) for name in names}
+    quantities |= {f"std_{name}": quantity for name, quantity in quantities.items()}
     stiffness = [] if rigid else [("k", ENDS[0])]
     groups = [("mu0",), ("Fz",), *stiffness, ("y0", AMPLITUDE), ("omega", "f"), ("v0",)]
-    return ColumnNames(like, groups)
+    return ColumnNames(quantities, groups)
 
 
 def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
@@ -274,8 +275,8 @@ def answer_columns(
     Raise FilesError where it has another contact or direction than the batches before it.
     """
     if columns.words and (kind := kind_of_batch(batch, SPRING)) != columns.kind:
-        both = " and ".join(", ".join(one.names.values()) for one in (columns.kind, kind))
-        raise FilesError(f"the file holds {both}: it is one for a file; write a file for each")
+        kinds = " and ".join(", ".join(one.names.values()) for one in (columns.kind, kind))
+        raise FilesError(f"the file holds {kinds}: it is one for a file; write a file for each")
     by_heading: dict[str, Array] = {}
     values: dict[str, Any] = {} if {"k", *ENDS} & columns.headings.keys() else {"k": math.inf}
     faults: dict[str, dict[int, str]] = {}

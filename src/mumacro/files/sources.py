@@ -89,8 +89,8 @@ def find_files(
             raise FilesError(f"{entry}: no such file, or none that ends in {ENDINGS}")
         if strays:
             names = ", ".join(stray.name for stray in strays[:5])
-            more = f" and {len(strays) - 5} more" if len(strays) > 5 else ""
-            say(f"{entry}: skipped {names}{more}")
+            rest = f" and {len(strays) - 5} more" if len(strays) > 5 else ""
+            say(f"{entry}: skipped {names}{rest}")
         files += tables
         formats |= dict.fromkeys(format_of(one, FORMATS)[0] for one in tables)
     if len(formats) > 1:
@@ -219,9 +219,9 @@ class TextSource:
         path, table = self.files[file], self.tables[file]
         size, place = max(path.stat().st_size, 1), 0
 
-        def report_place(at: int) -> None:
+        def report_place(byte: int) -> None:
             nonlocal place
-            place = at
+            place = byte
 
         try:
             for rows in table.rows(report_place):
