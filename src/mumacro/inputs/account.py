@@ -136,6 +136,8 @@ class Account:
             return self._skip(line)
         cells = [cell.strip() for cell in self._cells(text)]
         first = next((cell for cell in cells if cell), "")
+        if not first:  # a blank line with its cells in quotes
+            return False
         if names_statistics(first):
             what = f"{first!r} begins a row of statistics"
             raise TextError(f"line {line}: {what}: {self.remedy(line)}")

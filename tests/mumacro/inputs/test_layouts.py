@@ -49,6 +49,7 @@ BEGIN, MIDDLE = "1,0.069\n2,0.097\n", "5,0.174\n10,0.221\n"
 
 #: what is read
 READ: dict[str, str | bytes] = {
+    "blank lines whose cells are in quotes": HEAD + '"",""\n' + PLAIN + '" ",\n',
     "TDMS as text, units in the list of channels": (
         "Group\tChannels\nFriction\t2\n\nChannel\tDatatype\tUnit\tLength\n"
         "v0\tDBL\tmm/s\t4\nmu_macro\tDBL\t-\t4\n\nv0\tmu_macro\n" + TAB
