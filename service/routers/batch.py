@@ -36,9 +36,8 @@ _BYTES_PER_UNIT = 16  # bytes of a body whose reading has the cost 1, see servic
 # costs of reading a row, and a text or a null, where Python reads them one by one
 _ROW, _WORD = 400.0, 40.0
 _READS = threading.Lock()
-_LOOK_EVERY_S = (
-    0.05  # seconds between two looks of a thread that waits to read whether it is to end
-)
+# between two looks of a thread that waits to read whether it is to end
+_LOOK_EVERY_S = 0.05
 
 
 class _Answer(Response):

@@ -589,8 +589,6 @@ class Surrogate:
             if types <= _SIMPLE:  # there is nothing else to look for
                 fields = FIELDS if f is ABSENT else _SIX_WITH_F
                 of_six = Cases.of(dict(zip(fields, six, strict=True)), _SHORT[contact])
-                if type(include) is tuple and not (include or gradient or of_six.std):
-                    return self.answer(of_six)
                 return self.answer(of_six, chosen(include, of_six, gradient))
         for name, value in unknown_names.items():
             raise no_such_input(name, value)
@@ -616,8 +614,6 @@ class Surrogate:
             names = [*names_in(include), *["gradient"] * bool(gradient)]
             return evaluate_labelled(self, cases, values, names, strict)
         of_values = Cases.of(values, strict=strict)
-        if type(include) is tuple and not (include or gradient or of_values.std):
-            return self.answer(of_values)
         return self.answer(of_values, chosen(include, of_values, gradient))
 
     def answer(

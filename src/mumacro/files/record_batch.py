@@ -17,7 +17,7 @@ from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, other_amplitude
-from mumacro.inputs.cells import in_si, numbers_of
+from mumacro.inputs.cells import numbers_of
 from mumacro.inputs.fields import (
     AMPLITUDE,
     ENDS,
@@ -31,7 +31,7 @@ from mumacro.inputs.fields import (
 )
 from mumacro.inputs.names import absent, find_heads, meant_by
 from mumacro.inputs.numbers import Signs
-from mumacro.inputs.units import Scale, scale_of, split_unit
+from mumacro.inputs.units import Scale, in_si, scale_of, split_unit, too_large_in_si
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.notes import Note
 from mumacro.outputs import OUTPUTS
@@ -339,8 +339,8 @@ def numbers(
         field = name.removeprefix("std_")
         cells = pc.cast(array, pa.string()).to_pylist()
         numbers, faults = numbers_of(cells, MEASURED_AS.get(field, field), signs, scale)
-        si, too_large = in_si(numbers, scale)
-        return numbers, si, faults | too_large
+        si = in_si(numbers, scale)
+        return numbers, si, faults | too_large_in_si(numbers, si)
     is_number = (
         pa.types.is_integer(arrow_type)
         or pa.types.is_floating(arrow_type)
@@ -350,7 +350,8 @@ def numbers(
         raise FilesError(f"the column {name} holds {arrow_type}, not numbers")
     column = pc.fill_null(pc.cast(array, pa.float64(), safe=False), math.nan)
     values: Array = column.to_numpy(zero_copy_only=False)
-    return values, *in_si(values, scale)
+    si = in_si(values, scale)
+    return values, si, too_large_in_si(values, si)
 
 
 def _field_and_reason(error: InputError) -> tuple[str, str]:

@@ -14,6 +14,7 @@ from mumacro.inputs.units import (
     Unit,
     canonical,
     explain_unit,
+    in_si,
     is_level,
     parse_unit,
 )
@@ -133,10 +134,10 @@ def labelled_in_si(name: str, column: Any, quantity: str, scale: Scale | None = 
             raise two_units(name, _text_of(unit))
         scale = carried
     if library(column) != "xarray":
-        return column if scale is None else scale.si(column)
+        return column if scale is None else in_si(column, scale)
     data = column.data
     numbers = data if _unit_of_quantity(data) is None else _magnitude(data)
-    plain = column.copy(data=numbers if scale is None else scale.si(numbers))
+    plain = column.copy(data=numbers if scale is None else in_si(numbers, scale))
     plain.attrs = {}
     return plain
 

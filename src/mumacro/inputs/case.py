@@ -60,9 +60,12 @@ class Value(NamedTuple):
     text: str | None = None  #: as it came, where it came as a text
     unit: str | None = None  #: the unit that was understood; None: the number is in SI
 
-    def scaled(self, scale: Scale, unit: str) -> "Value":
-        """Return the same numbers, meant in a unit."""
-        si, std, low, high = (None if part is None else scale.si(part) for part in self[:4])
+    def scaled(self, name: str, scale: Scale, unit: str) -> "Value":
+        """Return the same numbers of an input, meant in a unit."""
+        si, std, low, high = (
+            None if part is None else _in_si(name, f"{part!r} {unit}", part, scale)
+            for part in self[:4]
+        )
         return Value(si, std, low, high, self.text, unit)
 
 
@@ -108,7 +111,7 @@ def read(name: str, value: Any, quantity: str = "") -> Value:
     unit = carried_unit(value)
     if unit is not None:
         held = without_carried_unit(name, value, unit, quantity)
-        return read(name, held.numbers, quantity).scaled(held.scale, held.unit)
+        return read(name, held.numbers, quantity).scaled(name, held.scale, held.unit)
     if (pair := uncertain(value)) is not None:
         return Value(*pair)
     plain = without_mask(value)
@@ -234,7 +237,16 @@ def _of_text(name: str, quantity: str, raw: str) -> Value:
             raise
         raise InputError(name, raw, _of_no_number(quantity, str(error))) from None
     scale, symbol = _parse_or_refuse(name, quantity, raw, number, unit)
-    return Value(scale.si(number), text=raw, unit=symbol)
+    return Value(_in_si(name, raw, number, scale), text=raw, unit=symbol)
+
+
+def _in_si(name: str, shown: str, number: float, scale: Scale) -> float:
+    """Return a number in SI; InputError for one beyond the doubles: a large stiffness is no rigid
+    contact."""
+    si = scale.si(number)
+    if math.isinf(si) and math.isfinite(number):
+        raise InputError(name, shown, "at most 1.8e308 in SI, the largest number there is")
+    return si
 
 
 def _of_no_number(quantity: str, reason: str) -> str:
@@ -294,11 +306,11 @@ def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) ->
         raise InputError(name, raw, bound)
     of_value = unit if relative else unit or behind
     scale, symbol = _parse_or_refuse(name, quantity, raw, number, of_value)
-    value = scale.si(number)
+    value = _in_si(name, raw, number, scale)
     if relative:
         return Value(value, abs(value) * deviation / 100.0, text=raw, unit=symbol)
     scale, _ = _parse_or_refuse(name, quantity, raw, deviation, behind or unit)
-    return Value(value, scale.si(deviation), text=raw, unit=symbol)
+    return Value(value, _in_si(name, raw, deviation, scale), text=raw, unit=symbol)
 
 
 def _interval(name: str, quantity: str, raw: str, text: str) -> Value:
@@ -310,7 +322,7 @@ def _interval(name: str, quantity: str, raw: str, text: str) -> Value:
     high, behind = split_number(right.strip(" ."))
     scale_of_low, _ = _parse_or_refuse(name, quantity, raw, low, unit or behind)
     scale, symbol = _parse_or_refuse(name, quantity, raw, high, behind or unit)
-    ends = scale_of_low.si(low), scale.si(high)
+    ends = _in_si(name, raw, low, scale_of_low), _in_si(name, raw, high, scale)
     if not 0.0 < ends[0] <= ends[1] < math.inf:
         raise InputError(name, raw, _INTERVAL)
     middle = min(max(math.sqrt(ends[0]) * math.sqrt(ends[1]), ends[0]), ends[1])

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from mumacro.inputs.fields import QUANTITY_OF, RIGID, is_rigid
-from mumacro.inputs.numbers import TOO_LARGE, Signs, read_number, split_number, tidy
+from mumacro.inputs.numbers import Signs, read_number, split_number, tidy
 from mumacro.inputs.units import QUANTITIES, Scale, canonical, scale_of
 from mumacro.kernel.arrays import Array
 
@@ -194,18 +194,3 @@ def numbers_of(
         except ValueError as error:
             faults[i] = str(error)
     return values, faults
-
-
-def in_si(values: Array, scale: Scale) -> tuple[Array, dict[int, str]]:
-    """Return numbers in SI, and what is wrong with those that are too large in it, by their index:
-    a large stiffness is no rigid contact.
-
-    >>> in_si(np.array([2.0, 1e308]), Scale(times=1e3))
-    (array([2000.,   nan]), {1: 'is too large, above 1.8e308'})
-    """
-    with np.errstate(over="ignore"):
-        si: Array = values if scale == Scale() else values * scale.times / scale.over
-    beyond = np.isinf(si) & np.isfinite(values)
-    if beyond.any():
-        si = np.where(beyond, math.nan, si)
-    return si, dict.fromkeys(np.flatnonzero(beyond).tolist(), TOO_LARGE)

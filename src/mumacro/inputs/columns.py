@@ -34,7 +34,8 @@ from mumacro.inputs.case import (
     read,
 )
 from mumacro.inputs.fields import GAP, is_rigid, quantity_of
-from mumacro.inputs.units import QUANTITIES, parse_unit, scale_of
+from mumacro.inputs.numbers import TOO_LARGE
+from mumacro.inputs.units import QUANTITIES, in_si, parse_unit, scale_of, too_large_in_si
 from mumacro.kernel.arrays import Array
 
 _FLOAT = np.dtype(np.float64)
@@ -126,8 +127,12 @@ def read_column(name: str, values: Any, quantity: str = "", unit: str = "") -> C
             raise two_units(name, str(carried))
         values, scale, unit = without_carried_unit(name, values, carried, quantity)
     si, faults = _doubles(name, values, quantity)
-    in_si: Any = si if scale is None else scale.si(si)  # type: ignore[arg-type]  # of an array
-    return Column(in_si, unit or None, faults)
+    if scale is None:
+        return Column(si, unit or None, faults)
+    numbers, si = si, in_si(si, scale)
+    for place in too_large_in_si(numbers, si):
+        faults[place] = Fault(f"{numbers.flat[place]:.12g} {unit}", TOO_LARGE)
+    return Column(si, unit, faults)
 
 
 def to_si(name: str, value: Any, quantity: str = "") -> Any:
@@ -178,7 +183,7 @@ def in_unit(name: str, value: Any, unit: str) -> Any:
         return read_column(name, value, quantity, unit)
     one = read(name, value, quantity)
     if one.unit is None:
-        return one.scaled(scale, unit)
+        return one.scaled(name, scale, unit)
     if scale_of(name, one.unit) != scale:
         raise two_units(name, one.unit)
     return one

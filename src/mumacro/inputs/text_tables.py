@@ -23,11 +23,12 @@ from mumacro.inputs.account import (
     ColumnNames,
     names_statistics,
 )
-from mumacro.inputs.cells import BLANKS, MOST_COLUMNS, in_si, is_comment, numbers_of, split_row
+from mumacro.inputs.cells import BLANKS, MOST_COLUMNS, is_comment, numbers_of, split_row
 from mumacro.inputs.decoding import LONGEST, Piece, Text, file_pieces
 from mumacro.inputs.layout import LOOKED_AT, Dialect, find_layout
 from mumacro.inputs.names import absent, find_heads
 from mumacro.inputs.numbers import Cell
+from mumacro.inputs.units import in_si, too_large_in_si
 from mumacro.inputs.workbooks import BEGIN, SEP, read_sheet
 from mumacro.kernel.arrays import Array, Places
 
@@ -445,8 +446,8 @@ def read_numbers(
     for name, (i, scale) in columns.items():
         texts = [cells[i] for cells in rows]
         as_written[name], bad = numbers_of(texts, input_of[name], signs, scale)
-        si[name], too_large = in_si(as_written[name], scale)
-        bad |= too_large
+        si[name] = in_si(as_written[name], scale)
+        bad |= too_large_in_si(as_written[name], si[name])
         for j in np.flatnonzero(np.isnan(si[name])).tolist():
             fault = f"{bad[j]}, got {texts[j].strip()[:80]!r}" if j in bad else "is missing"
             wrong.append((lines[j], f"line {lines[j]}: {name} {fault}"))

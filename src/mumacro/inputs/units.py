@@ -5,10 +5,16 @@ import functools
 import math
 import re
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
+
+import numpy as np
 
 from mumacro.inputs.fields import QUANTITY_OF, RAD_PER_CYCLE, SI, quantity_of
-from mumacro.inputs.numbers import tidy
+from mumacro.inputs.numbers import TOO_LARGE, tidy
+from mumacro.kernel.arrays import Array
+
+#: one number, or an array of them
+Number = TypeVar("Number", float, Array)
 
 
 class Scale(NamedTuple):
@@ -18,8 +24,8 @@ class Scale(NamedTuple):
     times: float = 1.0
     over: float = 1.0
 
-    def si(self, value: float) -> float:
-        """Return ``value`` in the SI unit."""
+    def si(self, value: Number) -> Number:
+        """Return a number, or an array, in the SI unit; infinite where it is too large in it."""
         return value * self.times / self.over
 
     def of_si(self, value: float) -> float:
@@ -218,6 +224,26 @@ def suit_unit(si: str, value: float) -> Unit:
     if not usual or size == 0.0 or not math.isfinite(size):
         return Unit(si)
     return next((unit for unit in usual if size >= 0.1 * unit.scale.si(1.0)), usual[-1])
+
+
+def in_si(values: Array, scale: Scale) -> Array:
+    """Return the numbers of an array in SI, NaN for one that is too large in it: a large stiffness
+    is no rigid contact.
+
+    >>> in_si(np.array([2.0, 1e308]), Scale(times=1e3))
+    array([2000.,   nan])
+    """
+    if scale == Scale():
+        return values
+    with np.errstate(over="ignore"):
+        si: Array = scale.si(values)
+    return np.where(np.isinf(si) & np.isfinite(values), math.nan, si)
+
+
+def too_large_in_si(values: Array, si: Array) -> dict[int, str]:
+    """Return what is wrong with the numbers that :func:`in_si` made NaN, by their index."""
+    places = np.flatnonzero(np.isnan(si) & ~np.isnan(values))
+    return dict.fromkeys(places.tolist(), TOO_LARGE)
 
 
 # --- a unit as people and programs write it -------------------------------------------------------

@@ -244,6 +244,30 @@ def test_a_gap_spoils_its_case_alone_and_the_case_knows_why() -> None:
         surrogate.evaluate({**CASE, "k": [[1e6], ["soft"]], "y0": [[2e-6, 3e-6]]}, illegal="raise")
 
 
+def test_a_stiffness_that_is_too_large_in_si_is_a_gap_and_not_rigid() -> None:
+    pa, xr = pytest.importorskip("pyarrow"), pytest.importorskip("xarray")
+    surrogate, unit = opened(1e-7), {"units": "N/um"}
+    k = [1.0, 1e305]
+    series = pd.Series(k)
+    series.attrs.update(unit)
+    fields = [pa.field(name, pa.float64(), metadata=unit if name == "k" else None) for name in CASE]
+    columns = {name: [x, x] for name, x in CASE.items()} | {"k": k}
+    frame = pd.DataFrame(columns).rename(columns={"k": "k [N/um]"})
+    with np.errstate(all="raise"):
+        answers = [
+            surrogate.evaluate(**{**CASE, "k": series}).mu_macro,
+            surrogate.evaluate(**{**CASE, "k": xr.DataArray(k, attrs=unit)}).mu_macro.values,
+            surrogate.evaluate(frame)["mu_macro"].to_numpy(),
+            surrogate.evaluate(pa.table(columns, schema=pa.schema(fields)))["mu_macro"].to_numpy(),
+        ]
+    for answer in answers:
+        assert np.isnan(answer).tolist() == [False, True]
+    column = read_column("k", k, unit="N/um")
+    assert column.faults[1] == ("1e+305 N/um", "is too large, above 1.8e308")
+    with refused("k"):
+        surrogate.evaluate(pd.Series({**CASE, "k [N/um]": 1e305}, dtype=object).drop("k"))
+
+
 def test_a_column_that_was_read_before_is_taken_as_it_is() -> None:
     column = Column(np.array([0.01, 0.02]), "mm/s")
     assert read_column("v0", column) is column

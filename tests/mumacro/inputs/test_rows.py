@@ -9,12 +9,12 @@ import pytest
 from mumacro.errors import TextError
 from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.case import read
-from mumacro.inputs.cells import in_si, numbers_of
+from mumacro.inputs.cells import numbers_of
 from mumacro.inputs.doubts import remarks
 from mumacro.inputs.layout import Dialect
 from mumacro.inputs.numbers import TOO_LARGE, Signs
 from mumacro.inputs.text_tables import TableOfNumbers, read_numbers
-from mumacro.inputs.units import scale_of
+from mumacro.inputs.units import in_si, scale_of, too_large_in_si
 from tests.support.comparing import close
 
 POINTS = ColumnNames({"v0": "v0", "mu_macro": "mu0"}, [["v0"], ["mu_macro"]])
@@ -57,10 +57,10 @@ def test_a_cell_beyond_the_head_is_not_dropped() -> None:
 def test_a_number_that_is_too_large_in_si_is_no_rigid_contact() -> None:
     scale: Any = scale_of("k", "N/um")
     values, _ = numbers_of(["1e301", "1e305"], "k", Signs(".", None))
-    si, faults = in_si(values, scale)
+    si = in_si(values, scale)
     assert si[0] == close(1e307, rel=1e-15)
     assert math.isnan(si[1])
-    assert faults == {1: TOO_LARGE}
+    assert too_large_in_si(values, si) == {1: TOO_LARGE}
 
 
 @pytest.mark.parametrize(
