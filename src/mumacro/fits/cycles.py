@@ -1,4 +1,4 @@
-"""Where the cycles of a recorded motion begin and end."""
+"""Find where the cycles of a recorded motion begin and end."""
 
 from typing import NamedTuple
 
@@ -6,25 +6,25 @@ import numpy as np
 
 from mumacro.kernel.arrays import Array
 
-_TURN = 0.5  # share of the range that a motion must go back to have turned
-_STEPS = 1.5  # steps, at most, between the ends of a closed cycle
+_TURN = 0.5  # the motion has turned once it has gone back by this fraction of its range
+_STEPS = 1.5  # a cycle is closed if its ends are at most this many steps apart
 
 
 class Cycles(NamedTuple):
     """The whole cycles among samples (n,)."""
 
-    begins: tuple[int, ...]  #: the sample of each, and behind them the end of the last
-    goes_on: bool  #: whether part of a cycle follows
+    begins: tuple[int, ...]  #: the first sample of each cycle, then the end of the last one
+    goes_on: bool  #: whether part of a cycle follows the last whole one
 
     @property
     def number(self) -> int:
-        """How many cycles are whole."""
+        """Return the number of whole cycles."""
         return len(self.begins) - 1
 
 
 def cycles_of(x: Array) -> Cycles:
-    """Return the whole cycles of a motion: each ends where the motion is back at its first place,
-    in its first direction.
+    """Return the whole cycles of a motion.  A cycle ends where the motion is back at its first
+    position and moves in its first direction.
 
     >>> cycles_of(np.sin(np.linspace(0.0, 6.0 * np.pi, 301)))
     Cycles(begins=(0, 100, 200, 301), goes_on=False)
@@ -45,7 +45,7 @@ def cycles_of(x: Array) -> Cycles:
         begins.append(last + 1 if end == last else end)
         if end == last:
             return Cycles(tuple(begins), False)
-    # a cycle that ends at its second turn, or just before its first place
+    # The second turn is the end of the cycle, or the end comes just before the first position.
     if len(turns) >= 2 * len(begins) - 1 and abs(x[last] - x[0]) <= step and last - begins[-1] > 2:
         begins.append(last + 1)
         return Cycles(tuple(begins), False)
@@ -53,8 +53,8 @@ def cycles_of(x: Array) -> Cycles:
 
 
 def _turns(x: Array) -> tuple[list[int], int]:
-    """Return the samples at which a motion turns back by half of its range, and its first
-    direction, 1 or -1."""
+    """Return the samples at which a motion has turned back by half of its range, and its first
+    direction: 1 or -1."""
     span = _TURN * float(np.ptp(x))
     turns: list[int] = []
     direction, least, most = 0, 0, 0

@@ -1,9 +1,10 @@
-"""k and mu0 from measured points: least squares with the exact gradient of the table, and warnings
-of what the points do not determine.
+"""Fit k and mu0 to measured points: least squares with the exact gradient of the table.  Warn of
+what the points do not determine.
 
-mu_macro = mu0 mu~(p) with p = k/mu0: at each p the best mu0 follows from a linear equation, so that
-one profile of chi2 over p (:mod:`mumacro.fits.profile`) has every minimum, the limits of a soft
-and of a rigid contact, and the ranges that the points allow.  Needs scipy, a plot matplotlib.
+The model is mu_macro = mu0 mu~(p) with p = k/mu0.  For each p the best mu0 follows from a linear
+equation.  So one profile of chi2 over p (:mod:`mumacro.fits.profile`) shows every minimum, the
+limits of a soft and of a rigid contact, and the ranges that the points allow.  The fit needs scipy,
+a plot needs matplotlib.
 """
 
 import functools
@@ -23,10 +24,11 @@ from mumacro.notes import WARNING, Note
 from mumacro.surrogate import Surrogate
 from mumacro.validity import HARDLY
 
-_PER_DECADE, _MOST_NODES = 10, 600  # the first samples: places a decade, places at most
-# y~, for normal v~, at which a contact is so soft that friction is mu0 to 6 digits or more
+_PER_DECADE, _MOST_NODES = 10, 600  # the first samples: per decade, and the largest number
+# at this y~ (for normal: v~) a contact is so soft that friction is mu0 to at least 6 digits
 _SOFT = {"across": 1e-4, "along": 1e-6, "normal": 1e-6}
-_NARROW = 1e-6  # width in logarithms of an interval in which chi2 is a parabola
+# chi2 is a parabola in an interval of k or mu0 whose width in logarithms is less than this
+_NARROW = 1e-6
 
 
 @np.errstate(all="ignore")
@@ -65,9 +67,9 @@ def fit(
     Raises
     ------
     InputError
-        A column or input is missing, out of bounds, given twice or of another length; fewer points
-        than unknowns; points without information; more friction than the known mu0 allows; an
-        unknown contact or unknown.
+        If a column or input is missing, out of bounds, given twice or of another length; if there
+        are fewer points than unknowns, or points without information; if friction is larger than
+        the known mu0 allows; if the contact or an unknown does not exist.
 
     Examples
     --------
@@ -106,8 +108,8 @@ class _Problem(Measured):
     """The search for the unknowns at which the model fits the points best."""
 
     def _profile(self, limit_of: Callable[[float], float]) -> Profile:
-        """Profile chi2 over k, over mu0 of a known k, or over k/mu0 with the best mu0; the last
-        place of k is rigid."""
+        """Return the profile of chi2 over k, over mu0 (if k is known), or over k/mu0 with the best
+        mu0.  The last sample of k is the rigid contact."""
         has_factor = len(self.unknowns) == 2
         along = self.unknowns[0]
 
@@ -126,19 +128,19 @@ class _Problem(Measured):
         return Profile(model, self.weight * self.mu, has_factor, np.append(s, rigid), limit_of)
 
     def _ends_of_mu0(self) -> tuple[float, float]:
-        """Return logarithms of a small and a large mu0, for a known k."""
+        """Return the logarithms of a small and of a large mu0, for a known k."""
         top = math.log(self.mu.max())
         return top + math.log(1e-3), top + math.log(1e6)
 
     def _ends_of_k(self, per_mu0: bool) -> tuple[float, float]:
-        """Return logarithms of k, or of k/mu0, so soft that friction is mu0 and as good as
-        rigid."""
+        """Return two logarithms of k, or of k/mu0: one so small that friction is mu0, and one so
+        large that the contact is as good as rigid."""
         force, omega, v0 = (self.columns[name] for name in ("Fz", "omega", "v0"))
         with np.errstate(all="ignore"):
             speed_length = v0 / omega
             amplitude = self.columns["y0"] if self.amplitude == "y0" else speed_length
             oscillates = (amplitude > 0.0) & (omega > 0.0)
-            # v~ = 100, and 100 times y~/v~, where it slides; where it only rests y~ = 100
+            # Where the body slides: v~ = 100, and 100 times y~/v~.  Where it only rests: y~ = 100.
             length = np.where(
                 speed_length > 0.0,
                 np.minimum(speed_length, speed_length / amplitude * speed_length),
@@ -153,12 +155,12 @@ class _Problem(Measured):
     # --- solutions --------------------------------------------------------------------------------
 
     def solve(self) -> Fit:
-        """Sample the profile of chi2, and make the fit with its intervals and warnings."""
+        """Return the fit: sample the profile of chi2, then compute intervals and warnings."""
         size, dof = float(((self.weight * self.mu) ** 2).sum()), self.n - len(self.unknowns)
         width = quantile(dof if self.std is None else None)
 
         def variance_at(chi2: float) -> float:
-            rounding = 1e-30 * size  # of exact points: mu_macro has sixteen digits
+            rounding = 1e-30 * size  # points without errors: mu_macro has 16 digits
             if self.std is not None:
                 return 1.0
             return max(chi2 / dof, rounding) if dof else math.inf
@@ -205,10 +207,10 @@ class _Problem(Measured):
         )
 
     def _solutions(self, profile: Profile, barrier_at: Callable[[float], float]) -> list[_Minimum]:
-        """Return the minima that are allowed, best first.
+        """Return the allowed minima, the best one first.
 
-        A minimum is a solution of its own if chi2 rises by at least one standard deviation on the
-        way to every better solution; else it is a ripple of that one.
+        A minimum is a separate solution if chi2 rises by at least one standard deviation on the way
+        to every better solution.  Otherwise it is a ripple of a better one.
         """
         minima = [
             _Minimum(float(profile.samples.chi2[i]), self._values_at(profile, i), i)
@@ -225,7 +227,7 @@ class _Problem(Measured):
         return solutions
 
     def _values_at(self, profile: Profile, sample: int) -> dict[str, float]:
-        """Return the unknowns at a sample."""
+        """Return the values of the unknowns at a sample of the profile."""
         with np.errstate(over="ignore"):
             x, factor = (
                 float(np.exp(profile.samples.s[sample])),
@@ -238,14 +240,15 @@ class _Problem(Measured):
         return {name: values[name] for name in self.unknowns}
 
     def _log_slopes(self, values: Mapping[str, float]) -> Array:
-        """Return d(weighted mu_macro) / d ln(unknown), (points, unknowns); 0 for an infinite k."""
+        """Return d(weighted mu_macro) / d ln(unknown), shape (points, unknowns).  It is 0 for an
+        infinite k."""
         slopes = self.model(values, self.columns)[1]
         columns = [slopes[name] * (x if math.isfinite(x) else 0.0) for name, x in values.items()]
         return np.stack(columns, axis=-1) * self.weight[:, None]
 
     def _covariance(self, values: Mapping[str, float], variance: float) -> Array:
-        """Return that of the logarithms of the unknowns; infinite for one that the points do not
-        determine."""
+        """Return the covariance of the logarithms of the unknowns.  It is infinite for an unknown
+        that the points do not determine."""
         slopes = self._log_slopes(values)
         determined = np.abs(slopes).max(axis=0) > 1e-12 * np.abs(self.weight * self.mu).max()
         covariance = np.diag(np.where(determined, 0.0, math.inf))
@@ -264,9 +267,9 @@ class _Problem(Measured):
     def _interval(
         self, profile: Profile, solutions: Sequence[_Minimum], width: float, variance: float
     ) -> dict[str, tuple[float, float]]:
-        """Return what the profile of chi2 allows; of exact points, or without a measure of the
-        error, what the covariance says. Any of the solutions may be the true contact: it covers
-        them all."""
+        """Return the 95 % interval of each unknown: the range that the profile of chi2 allows.  The
+        covariance gives the interval if the points have no error, or if their error is unknown.
+        Any of the solutions may be the true contact, so the interval covers all of them."""
         half_widths = [
             width * np.sqrt(np.diag(self._covariance(one.values, variance))) for one in solutions
         ]
@@ -280,8 +283,8 @@ class _Problem(Measured):
         return self._allowed_ranges(profile)
 
     def _allowed_ranges(self, profile: Profile) -> dict[str, tuple[float, float]]:
-        """Return the smallest and the largest value of each unknown among the contacts that are
-        allowed; where the softest is, k has no lower bound."""
+        """Return the smallest and the largest value of each unknown among the allowed contacts.  If
+        the softest sample is allowed, k has no lower bound."""
         ranges = dict(zip(self.unknowns, profile.ranges(), strict=True))
         if profile.samples.chi2[0] <= profile.limit:
             along = self.unknowns[0]
@@ -342,7 +345,8 @@ class _Problem(Measured):
 
 
 def _around(values: Mapping[str, float], half_widths: Array) -> dict[str, tuple[float, float]]:
-    """Return intervals about values whose logarithms may be off by ``half_widths`` (unknowns,)."""
+    """Return the intervals around values whose logarithms have an uncertainty of ``half_widths``
+    (unknowns,)."""
     with np.errstate(over="ignore"):
         return {
             name: (

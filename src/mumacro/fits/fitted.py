@@ -1,4 +1,4 @@
-"""What a fit of measured points says: :class:`Fit`, from :func:`mumacro.fit`."""
+"""Hold the results of a fit to measured points: :class:`Fit`, from :func:`mumacro.fit`."""
 
 import math
 from collections.abc import Mapping
@@ -20,19 +20,20 @@ _CURVE = 200  # points of the fitted law
 
 class _Prediction(NamedTuple):
     mu_macro: Any  #: [-]
-    #: its standard deviation, from the covariance of the fit [-].  Where the points had no ``std``
-    #: it is known from their scatter alone: a 95 % interval takes Student's factor of it
+    #: its standard deviation [-], from the covariance of the fit.  If the points had no ``std``,
+    #: only their scatter about the fit is known; then multiply it by Student's factor for a 95 %
+    #: interval
     std: Any
 
 
 class Prediction(Result, _Prediction):
-    """Friction that a fit predicts, in the shape of the inputs."""
+    """Hold the friction that a fit predicts, in the shape of the inputs."""
 
     __slots__ = ()
 
     @property
     def columns(self) -> dict[str, Any]:
-        """Both by name; of a frame one row a case."""
+        """Return mu_macro and its standard deviation by name; for a frame one row for each case."""
         return self._asdict()
 
     def _heading(self) -> str:
@@ -54,31 +55,31 @@ class Fit(Result):
     Attributes
     ----------
     values : dict
-        k [N/m] and mu0 [-], those that were unknown; k is infinite where a rigid contact fits best.
+        k [N/m] and mu0 [-], if they were unknown; k is infinite if a rigid contact fits best.
     std : dict
-        Their standard deviations; infinite where the points do not determine a value.
+        Their standard deviations; infinite if the points do not determine a value.
     covariance : ndarray
-        (unknowns, unknowns), in the order of ``values``.  Without standard deviations of the points
-        it is scaled by the scatter about the fit.
+        Shape (unknowns, unknowns), in the order of ``values``.  If the points have no standard
+        deviations, it is scaled by the scatter about the fit.
     interval : dict of tuple
-        95 % intervals (low, high); low = 0 or high = inf where there is no bound on that side.  Of
-        several solutions they cover all, while ``std`` and ``covariance`` are those of the best
-        one.
+        95 % intervals (low, high); low = 0 or high = inf if there is no bound on that side.  If
+        there are several solutions, the interval covers all; ``std`` and ``covariance`` belong to
+        the best one.
     residuals : ndarray
-        Measured mu_macro minus the fit's [-], (n,).
+        Measured mu_macro minus mu_macro of the fit [-], (n,).
     chi2, reduced_chi2 : float
-        Sum of squared residuals over their variances (1 by default); the same over the degrees of
-        freedom, NaN without any.
+        Sum of squared residuals over their variances (1 by default); the same divided by the
+        degrees of freedom, NaN if there are none.
     solutions : tuple of dict
-        All minima that the points allow within 95 %, best first, each with values and ``chi2``.
+        All minima that the points allow with a probability of 95 %, the best one first, each with
+        its values and ``chi2``.
     notes : tuple of Note
-        Warnings, each of a value that the points do not determine, or a doubt about the fit; and
-        remarks, what is doubtful about the points.
+        Warnings: a value that the points do not determine, or a doubt about the fit.  Remarks: what
+        looks wrong in the points.
     contact, direction : str
-        Of the contact that was fitted.
+        Contact and direction that were fitted.
     points : dict of ndarray
-        The inputs [SI] of each point, (n,), the unknown ones left out; ``mu_macro``, and ``std``
-        where given.
+        The known inputs [SI] of each point, (n,); ``mu_macro``, and ``std`` if the points have it.
     """
 
     values: dict[str, float]
@@ -97,28 +98,30 @@ class Fit(Result):
 
     @np.errstate(all="ignore")
     def predict(self, cases: Any = None, /, **inputs: Any) -> Prediction:
-        """Return mu_macro of the fit and its standard deviation, at the points or at other inputs.
+        """Return mu_macro of the fit and its standard deviation, at the measured points or for
+        other inputs.
 
         Parameters
         ----------
         cases : mapping, DataFrame, Arrow table or Dataset, optional
             Inputs by name, as for :meth:`mumacro.Surrogate.evaluate`; other columns are ignored.
         **inputs : float or array_like
-            The same by keyword: Fz, y0, omega or f, v0, and k or mu0 where that was known.  What is
-            left out is that of the points.
+            The same by keyword: Fz, y0, omega or f, v0, and k or mu0 if it was known.  An input
+            that is left out has the value of the points.
 
         Returns
         -------
         Prediction
-            ``mu_macro`` and ``std``; numbers for one case.  A 95 % interval has 1.96 of ``std`` to
-            either side, but where the points had no ``std`` Student's factor for as many degrees of
-            freedom as points exceed unknowns: 2.45 for 6, as the band of the picture has it.
+            ``mu_macro`` and ``std``; numbers for one case.  A 95 % interval is mu_macro ± 1.96
+            ``std``. If the points had no ``std``, use Student's factor instead of 1.96.  Its
+            degrees of freedom are points minus unknowns; for 6 it is 2.45.  The band of the plot
+            uses it, too.
 
         Raises
         ------
         InputError
-            An input that was fitted or is none; one that is left out and differs between the
-            points; a value out of bounds.
+            If an input was fitted or does not exist; if one is left out that differs between the
+            points; if a value is out of bounds.
 
         Examples
         --------
@@ -131,7 +134,7 @@ class Fit(Result):
         """
         columns = self._problem.elsewhere(cases, inputs)
         mu, slopes = self._problem.model(self.values, columns)
-        # a rigid contact has no slope along k
+        # a rigid contact has no derivative with respect to k
         covariance = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
         rows = np.stack([np.asarray(slopes[name]) for name in self.values], axis=-1)
         std = np.sqrt(np.einsum("...i,ij,...j", rows, covariance, rows))
@@ -142,7 +145,7 @@ class Fit(Result):
     @np.errstate(all="ignore")
     def curve(self) -> dict[str, Array] | None:
         """Return the fitted law over v0 with its 95 % band: v0 [m/s], mu_macro, low and high [-],
-        (n,); None where other inputs vary, too, or v0 is 0 everywhere."""
+        (n,).  Return None if other inputs vary, too, or if v0 is 0 everywhere."""
         inputs = dict(self._problem.columns)
         v0 = inputs.pop("v0")
         moving = v0[v0 > 0.0]
@@ -159,7 +162,7 @@ class Fit(Result):
         }
 
     def _members(self) -> dict[str, Any]:
-        """Return the word rigid stands for an infinite k."""
+        """Return the members of the fit; the word rigid stands for an infinite k."""
         worded = {
             name: _worded(getattr(self, name))
             for name in ("values", "interval", "solutions", "points")
@@ -167,7 +170,7 @@ class Fit(Result):
         remarks = {"remarks": self.remarks} if self.remarks else {}
         return {
             "values": worded["values"],
-            "std": self.std,  # an infinite deviation of k is no rigid contact
+            "std": self.std,  # here infinite does not mean rigid
             "covariance": self.covariance,
             "interval": worded["interval"],
             "residuals": self.residuals,
@@ -184,23 +187,23 @@ class Fit(Result):
 
     @property
     def columns(self) -> dict[str, Array]:
-        """The points, with mu_macro of the fit and the residuals."""
+        """Return the points, with mu_macro of the fit and the residuals."""
         friction = self.points["mu_macro"] - self.residuals
         return {**self.points, "fitted": friction, "residual": self.residuals}
 
     def _width(self) -> float:
-        """Return half width of a 95 % interval in standard deviations."""
+        """Return the half width of a 95 % interval in standard deviations."""
         has_std = STD in self.points
         return quantile(None if has_std else self.residuals.size - len(self.values))
 
     def plot(self, ax: Any = None) -> Any:
-        """Return points, fit and its 95 % band over the input that varies most, mostly v0, and
-        below them what the points deviate from the fit.
+        """Plot points, fit and its 95 % band over the input that varies most, usually v0, and below
+        them the residuals.
 
-        Each set of the other inputs has a curve; more than 8 of them have no legend.  Where each
-        point has a set of its own, such as its mu0, one curve goes through all of them, with the
-        other inputs interpolated.  ``ax`` are two axes of matplotlib, or one, which gets no
-        residuals, or new ones; the upper ones are returned.
+        Each set of the other inputs has its own curve; if there are more than 8, there is no
+        legend.  If each point has its own set (for example its own mu0), one curve passes through
+        all of them, and the other inputs are interpolated.  ``ax`` is a pair of matplotlib axes, or
+        one (then no residuals are drawn), or None for new ones.  The upper axes are returned.
         """
         inputs = {name: x for name, x in self._problem.columns.items() if name not in UNKNOWNS}
         along = max(inputs, key=lambda name: (np.unique(inputs[name]).size, name == "v0"))
@@ -228,7 +231,7 @@ class Fit(Result):
         self, label: str, along: str, here: Bools, fine: Array, fixed: Mapping[str, Any]
     ) -> plotting.MeasuredCurve:
         """Return the curve of the fit over the values ``fine`` of one input, with the points that
-        ``here`` selects; ``fixed`` holds the other inputs."""
+        ``here`` selects; ``fixed`` has the other inputs."""
         mu, deviation = self.predict(**{along: fine}, **fixed)
         bars = self.points[STD][here] if STD in self.points else None
         x, friction, residuals = (
@@ -260,7 +263,7 @@ class Fit(Result):
         return []
 
     def _in_full(self) -> tuple[str, Rows | None, list[str]]:
-        """Return the values with their deviations and intervals."""
+        """Return the values with their deviations and intervals as text."""
         rows: Rows = [
             (name, f"{x:.4g}", f"± {self.std[name]:.2g}", "95 %: {:.4g} to {:.4g}".format(*ends))
             for (name, x), ends in zip(self.values.items(), self.interval.values(), strict=True)
@@ -269,7 +272,7 @@ class Fit(Result):
 
 
 def _fine(x: Array) -> Array:
-    """Return values between the points, and these, so dense that a curve over them is smooth."""
+    """Return the points and values between them, so many that a curve through them looks smooth."""
     low = x[x > 0.0].min(initial=math.inf)
     if low == math.inf:
         return np.unique(x)
@@ -277,21 +280,22 @@ def _fine(x: Array) -> Array:
 
 
 def _interpolated(x: Array, column: Array, fine: Array) -> Any:
-    """Return an input of the points at other values of ``x``, smooth and monotone between them."""
+    """Return an input of the points, interpolated at other values of ``x``, smooth and monotone
+    between points."""
     if column.min() == column.max() or np.unique(x).size < 2:
         return float(column[0])
     from scipy.interpolate import PchipInterpolator
 
     places, member = np.unique(x, return_inverse=True)
     means = np.bincount(member.ravel(), column) / np.bincount(member.ravel())
-    # even on the axis of the picture, which is logarithmic where that is wide
+    # evenly spaced on the axis of the picture, which is logarithmic if the range is wide
     scale = places[places > 0.0].min()
     curve = PchipInterpolator(np.arcsinh(places / scale), means)
     return np.asarray(curve(np.arcsinh(fine / scale)))
 
 
 def _worded(part: Any, name: str = "") -> Any:
-    """Return a part of a fit, with the word rigid for an infinite k."""
+    """Return a member of a fit, with the word rigid for an infinite k."""
     if isinstance(part, Mapping):
         return {key: _worded(entry, key) for key, entry in part.items()}
     if isinstance(part, np.ndarray):

@@ -1,9 +1,9 @@
-"""k and mu0 from a measured loop of force over displacement.
+"""Fit k and mu0 to a measured loop of force over displacement.
 
-The force of the model is mu0 f(k/mu0) plus an offset and a drift, where f follows from the
-displacement by ``kernel/loop.c``.  Offset and drift are taken out of forces and model by a
-projection, mu0 is a factor: one profile of chi2 over k/mu0 (:mod:`mumacro.fits.profile`) is
-left.  Needs scipy, a plot matplotlib.
+The force of the model is mu0 f(k/mu0) plus an offset and a drift.  The displacement determines f
+(``kernel/loop.c``).  A projection removes offset and drift from the forces and from the model, and
+mu0 is a factor.  What remains is one profile of chi2 over k/mu0 (:mod:`mumacro.fits.profile`).  The
+fit needs scipy, a plot needs matplotlib.
 """
 
 import math
@@ -26,16 +26,19 @@ from mumacro.stopping import look
 
 LEAST, MOST = 6, 50_000  # samples of a loop
 _PER_DECADE = 12
-_SOFT = {"spring": 0.5, "ball": 1e-3}  # of k range / (mu0 Fz), below which a loop is a line
-_NARROW = 1e-6  # relative width of an interval in which chi2 is a parabola
-_ALLOWED = 200  # places of the profile at which offset and drift are looked at
-_STEPS = 30  # of Gauss and Newton, and of the force at the start
-_STICKING = 0.02  # share of the samples that must stick, and slip
-# what is noted: standard deviations, share of mu0 Fz, share of the squares of the residuals
+# values of k range / (mu0 Fz) below which a loop looks like a straight line
+_SOFT = {"spring": 0.5, "ball": 1e-3}
+_NARROW = 1e-6  # chi2 is a parabola in an interval with a smaller relative width
+_ALLOWED = 200  # samples of the profile at which offset and drift are computed
+_STEPS = 30  # steps of the Gauss-Newton method, and of the search for the force at the start
+_STICKING = 0.02  # fraction of the samples that must stick, and that must slip
+# Limits above which a note is made: standard deviations, fraction of mu0 Fz, fraction of the sum of
+# squared residuals.
 _SURE, _LARGE, _EXPLAINED = 4.0, 0.02, 0.2
-_GAP = 0.1  # share of the range of the force between the ends of a cycle that is periodic
-_AT_ONCE = 500_000  # samples that the kernel follows between two looks at the flag that ends it
-_PIECES = 8  # of a cycle, at least, whose residuals count as independent
+# a cycle is periodic if the force at its ends differs by less than this fraction of its range
+_GAP = 0.1
+_AT_ONCE = 500_000  # samples that the kernel processes between two checks of the flag that stops it
+_PIECES = 8  # smallest number of independent pieces into which the residuals of a cycle are cut
 _KERNEL = kernels[-1]
 _OTHER_SIGN = "the force is against the displacement: its sign is turned"
 _FIRST = (
@@ -55,32 +58,33 @@ def fit_loop(
     contact: str = "spring",
     cycles: tuple[int, int] | None = None,
 ) -> LoopFit:
-    """Return k and mu0 of a contact from a loop of tangential force over displacement.
+    """Fit k and mu0 of a contact to a loop of tangential force over displacement.
 
     Parameters
     ----------
     displacement, force : array_like
-        In the order of time, (n,): relative displacement [m], and the tangential force that moves
-        it [N], positive along the displacement; the opposite sign is turned, with a note.
+        Relative displacement [m] and the tangential force that moves it [N], in the order of time,
+        (n,).  The force is positive along the displacement; if its sign is the opposite, it is
+        changed, with a note.
     Fz : array_like
-        Normal force [N], one number, or for a spring one for each sample.
+        Normal force [N]: one number, or for a spring one for each sample.
     contact : str
         "spring" or "ball", as for :func:`mumacro.motion`: k of a ball is its initial stiffness.
     cycles : (int, int), optional
-        The first and the last whole cycle that is looked at, counted from 1; all samples if left
-        out.
+        The first and the last whole cycle to use, counted from 1.  By default all samples are used.
 
     Returns
     -------
     LoopFit
-        Of several cycles the first sets the state and does not count.  One cycle is taken as
-        periodic.  Less than one, of a spring only, begins with the first measured force.
+        If there are several cycles, the first one sets the state and does not count.  One cycle is
+        taken as periodic.  Less than one cycle (a spring only) begins with the first measured
+        force.
 
     Raises
     ------
     InputError
-        A value that is no finite number; columns of several lengths; a motion that never turns and
-        is no spring's; a load that is not > 0.
+        If a value is not a finite number; if the columns have different lengths; if the motion
+        never turns and the contact is not a spring; if a load is not > 0.
 
     Examples
     --------
@@ -98,9 +102,9 @@ def fit_loop(
 
 
 class _Loop:
-    """A loop as read, and the search for its k and mu0."""
+    """Hold a loop, and search for its k and mu0."""
 
-    x: Array  #: of the samples that are looked at [m]
+    x: Array  #: displacement of the samples in use [m]
     force: Array  #: [N]
     Fz: Array  #: [N]
 
@@ -134,7 +138,7 @@ class _Loop:
         load = np.ascontiguousarray(np.broadcast_to(load, x.size))
         self.notes: list[Note] = []
         self._take(x, measured, load, cycles)
-        # units of about 1: the range of the displacement, the mean load
+        # Use units in which values are about 1: the range of the displacement, the mean load.
         self.length, self.load = float(np.ptp(self.x)), float(self.Fz.mean())
         if _against(self.x, self.force):
             self.force = -self.force
@@ -142,7 +146,7 @@ class _Loop:
         self._set_out()
 
     def _take(self, x: Array, force: Array, load: Array, chosen: tuple[int, int] | None) -> None:
-        """Take the samples that are looked at, the cycles among them, and what counts."""
+        """Select the samples in use, the cycles among them, and the samples that count."""
         found = cycles_of(x)
         part = slice(0, x.size)
         if chosen is not None:
@@ -172,21 +176,22 @@ class _Loop:
             self._note(_FIRST)
 
     def _is_first(self) -> bool:
-        """Return whether the force of one closed cycle ends far from where it began."""
+        """Return whether the force at the end of a single closed cycle is far from the force at its
+        start."""
         step = float(np.abs(np.diff(self.force)).max()) if self.x[-1] != self.x[0] else 0.0
         gap = abs(float(self.force[-1] - self.force[0]))
         return gap > _GAP * float(np.ptp(self.force)) + step
 
     def _set_out(self) -> None:
-        """Set out offset and drift as columns, an orthonormal basis of them, and the force
-        beside it."""
+        """Compute an orthonormal basis of the columns for offset and drift, and the force without
+        them."""
         n = self.x.size
         times = np.arange(n, dtype=np.float64)[self.counted]
         middle, half = 0.5 * (times[0] + times[-1]), max(0.5 * float(np.ptp(times)), 1.0)
         self.names = [] if self.open else ["offset", *(["drift"] if self.number > 1 else [])]
         terms = np.stack([np.ones(times.size), (times - middle) / half], axis=1)
         self.linear = terms[:, : len(self.names)]
-        # the drift is that of the samples from the first on, the offset that at the first
+        # the drift begins at the first sample; the offset is the force there
         self.first, self.step = (times[0] - middle) / half, 1.0 / half
         self.basis = np.linalg.qr(self.linear)[0] if self.names else self.linear
         self.measured = self.force[self.counted]
@@ -197,11 +202,12 @@ class _Loop:
             raise InputError("displacement", f"{self.measured.size}", bound)
 
     def _aside(self, rows: Array) -> Array:
-        """Return rows without what offset and drift can be."""
+        """Return rows without the part that offset and drift can explain."""
         return np.ascontiguousarray(rows - (rows @ self.basis) @ self.basis.T)
 
     def _rows(self, p: Array, start: float) -> tuple[Array, Array]:
-        """Return force over mu0 of all samples, and its slope along ln p, for p = k/mu0 (m,)."""
+        """Return the force divided by mu0 at all samples, and its derivative with respect to ln p,
+        for p = k/mu0 (m,)."""
         found = []
         for piece in np.array_split(p, 1 + p.size * self.x.size // _AT_ONCE):
             look()
@@ -210,8 +216,8 @@ class _Loop:
         return np.concatenate(forces), np.concatenate(slopes)
 
     def _profile(self, start: float, spare: float) -> Profile:
-        """Return least chi2 over s = ln(k/mu0); ``spare`` is the rise that is allowed, as a share
-        of the variance about the fit."""
+        """Return the profile of chi2 over s = ln(k/mu0).  ``spare`` is the rise of chi2 that is
+        allowed, relative to the variance about the fit."""
 
         def model(s: Array, _slopes: bool) -> tuple[Array, Array]:
             rows, slopes = self._rows(np.exp(s), start)
@@ -282,13 +288,13 @@ class _Loop:
         )
 
     def _polished(self, s: float, mu0: float) -> tuple[float, float]:
-        """Return the minimum by Gauss and Newton, from a place nearby: the force is straight in k
-        and mu0 between the samples that begin to slip."""
+        """Return the minimum near a given place, by the Gauss-Newton method.  The force is linear
+        in k and mu0 except where a sample begins to slip."""
 
         def off(s: float, mu0: float) -> tuple[float, Array, Array, Array]:
             begin = float(self.force[0]) / mu0 if self.open else 0.0
             rows, slopes = (x[0, self.counted] for x in self._rows(np.exp([s]), begin))
-            if self.open:  # the force at the start is no multiple of mu0
+            if self.open:  # the force at the start is not proportional to mu0
                 kept = np.logical_and.accumulate(np.abs(rows) < self.Fz[self.counted])
                 by_mu0 = rows - np.where(kept, begin, 0.0)
             else:
@@ -312,29 +318,30 @@ class _Loop:
         return s, mu0
 
     def _linear(self, rows: Array, mu0: float) -> dict[str, float]:
-        """Return offset at the first sample and drift a sample."""
+        """Return the offset at the first sample and the drift per sample."""
         if not self.names:
             return {}
         shares = np.linalg.lstsq(self.linear, self.measured - mu0 * rows[self.counted])[0]
         return dict(zip(self.names, self._in_samples(shares).tolist(), strict=True))
 
     def _in_samples(self, shares: Array) -> Array:
-        """Return offset and drift a sample from the factors of their columns."""
+        """Return the offset and the drift per sample from the factors of their columns."""
         if len(self.names) < 2:
             return shares
         return np.array([shares[0] + self.first * shares[1], self.step * shares[1]])
 
     def _line(self, linear: dict[str, float]) -> Array:
-        """Return offset and drift at all samples."""
+        """Return the sum of offset and drift at all samples."""
         times = np.arange(self.x.size) - (self.counted.start or 0)
         return np.asarray(linear.get("offset", 0.0) + linear.get("drift", 0.0) * times)
 
     def _sticks(self, slopes: Array) -> Bools:
-        """Return which of the samples that count have not slipped in their step."""
+        """Return which of the samples that count stuck during their step."""
         return np.asarray(slopes[self.counted] != 0.0)
 
     def _energy(self, linear: dict[str, float]) -> float:
-        """Return the work of the force over a whole cycle [J], the mean of those that count."""
+        """Return the work of the force over a whole cycle [J], the mean over the cycles that count.
+        """
         if self.open:
             return math.nan
         force = self.force - self._line(linear)
@@ -357,7 +364,7 @@ class _Loop:
         dof: int,
     ) -> dict[str, tuple[float, float]]:
         width, mu0 = quantile(dof), values["mu0"]
-        # k, mu0, offset, drift: d ln k = d s + d ln mu0
+        # columns k, mu0, offset, drift: d ln k = d s + d ln mu0
         columns = np.stack(
             [mu0 * slopes[self.counted], rows[self.counted] - slopes[self.counted]], axis=1
         )
@@ -384,8 +391,8 @@ class _Loop:
         return self._by_profile(profile) | self._linear_by_profile(profile, around)
 
     def _by_profile(self, profile: Profile) -> dict[str, tuple[float, float]]:
-        """Return the smallest and the largest k and mu0 among the contacts that are allowed; where
-        a line is, the loop need not slip, and mu0 has no upper bound."""
+        """Return the smallest and the largest k and mu0 among the allowed contacts.  If a straight
+        line is allowed, the loop need not slip, and mu0 has no upper bound."""
         ranges = dict(zip(("k", "mu0"), profile.ranges(), strict=True))
         if profile.samples.chi2[0] <= profile.limit:
             ranges["mu0"] = ranges["mu0"][0], math.inf
@@ -394,7 +401,7 @@ class _Loop:
     def _linear_by_profile(
         self, profile: Profile, around: dict[str, tuple[float, float]]
     ) -> dict[str, tuple[float, float]]:
-        """Return smallest and largest offset and drift among them."""
+        """Return the smallest and the largest offset and drift among the allowed contacts."""
         if not self.names:
             return {}
         allowed = np.flatnonzero(profile.samples.chi2 <= profile.limit)
@@ -424,8 +431,8 @@ class _Loop:
     def _say_open_ends(
         self, values: dict[str, float], interval: dict[str, tuple[float, float]], sticks: Bools
     ) -> None:
-        """Say what the loop leaves open, as notes; an end that is open makes the value infinite
-        where nothing else can be said."""
+        """Add notes about what the loop does not determine.  If an end of an interval is open and
+        nothing else can be said, the value becomes infinite."""
         if interval["mu0"][1] == math.inf:
             least = interval["mu0"][0]
             self._note(f"the loop need not slip: mu0 has only a lower bound, {least:.4g} (95 %)")
@@ -446,7 +453,7 @@ class _Loop:
         sticks: Bools,
         variance: float,
     ) -> None:
-        """Note what the residuals say against the model."""
+        """Add notes about what in the residuals contradicts the model."""
         x, step = self.x[self.counted], np.diff(self.x, prepend=self.x[0])[self.counted]
         sign, speed = np.sign(step), np.abs(step)
         slips = ~sticks & (speed > 0.0)
@@ -455,8 +462,8 @@ class _Loop:
         load = mu0 * self.load
 
         def effect(regressor: Array, size: float) -> float:
-            """Return how large a share of mu0 Fz a regressor of the residuals has, 0 where that is
-            not sure."""
+            """Return the amplitude of a regressor in the residuals as a fraction of mu0 Fz; 0 if it
+            is not significant."""
             left = regressor - basis @ (basis.T @ regressor)
             square = float(left @ left)
             if not square > 1e-9 * float(regressor @ regressor) or not load > 0.0:
@@ -483,7 +490,7 @@ class _Loop:
 
 
 def _column(name: str, value: Any, quantity: str) -> Array:
-    """Return finite numbers in the order of time, (n,), in SI."""
+    """Return a column as finite numbers in SI, (n,), in the order of time."""
     column = np.ascontiguousarray(to_si(name, value, quantity))
     if column.ndim != 1 or not LEAST <= column.size <= MOST:
         bound = f"a column of {LEAST} to {MOST} samples: give some cycles, or each second sample"
@@ -495,7 +502,7 @@ def _column(name: str, value: Any, quantity: str) -> Array:
 
 
 def _whole(chosen: Any) -> tuple[int, int]:
-    """Return the first and the last cycle."""
+    """Return the numbers of the first and the last cycle."""
     if (
         not isinstance(chosen, tuple | list)
         or len(chosen) != 2
@@ -506,8 +513,8 @@ def _whole(chosen: Any) -> tuple[int, int]:
 
 
 def _against(x: Array, force: Array) -> bool:
-    """Return whether the force is against the displacement: both the work of a cycle and the
-    correlation are positive where it is along it."""
+    """Return whether the force has the opposite sign of the displacement.  If it has the same sign,
+    the work of a cycle and the correlation are both positive."""
     x, force = x - x.mean(), force - force.mean()
     work = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(x)))
     travelled = float(np.abs(np.diff(x)).sum())
@@ -516,8 +523,8 @@ def _against(x: Array, force: Array) -> bool:
 
 
 def _correlation(residuals: Array, dof: int, most: float) -> tuple[float, float]:
-    """Return by how much more the variance of a mean of residuals is than if they were
-    independent, from 1 to ``most``, and the degrees of freedom that are left."""
+    """Return how many times larger the variance of a mean of the residuals is than for independent
+    residuals (from 1 to ``most``), and the remaining degrees of freedom."""
     n = residuals.size
     spectrum = np.abs(np.fft.rfft(residuals, 2 * n)) ** 2
     covariance = np.fft.irfft(spectrum)[:n]
@@ -528,8 +535,9 @@ def _correlation(residuals: Array, dof: int, most: float) -> tuple[float, float]
         return 1.0, float(dof)
     sums = 1.0 + 2.0 * np.cumsum(rho[1 : max(n // 2, 2)])
     window = np.flatnonzero(np.arange(1, sums.size + 1) >= 5.0 * sums)
-    # Sums of a few correlations are too small, since a fit takes slow noise up; that of a noise
-    # which forgets evenly follows from its first correlation, nearly without that loss (Kendall).
+    # The sum of a few correlations is too small, because the fit absorbs slow noise.  For noise
+    # whose correlation decays exponentially, the sum follows from the first correlation, with
+    # little of that loss (Kendall).
     first = min(float(rho[1]) + (1.0 + 4.0 * float(rho[1])) / n, 1.0 - 1.0 / n)
     of_first = (1.0 + first) / (1.0 - first)
     tau = max(float(sums[window[0]] if window.size else sums.max()), of_first, 1.0)

@@ -1,4 +1,4 @@
-"""What a fit of a loop says: :class:`LoopFit`, from :func:`mumacro.fit_loop`."""
+"""Hold the results of a fit to a loop: :class:`LoopFit`, from :func:`mumacro.fit_loop`."""
 
 import math
 from dataclasses import dataclass, field
@@ -20,22 +20,22 @@ class LoopFit(Result):
     Attributes
     ----------
     values : dict
-        k [N/m], mu0 [-]; of whole cycles ``offset`` of the force at the first sample that counts
-        [N], of two cycles or more its ``drift`` [N a sample].  k is infinite where the loop never
-        sticks, mu0 where it never slips.
+        k [N/m], mu0 [-].  With whole cycles also ``offset``, the force at the first sample that
+        counts [N]; with two cycles or more also ``drift`` [N per sample].  k is infinite if the
+        loop never sticks, mu0 if it never slips.
     interval : dict of tuple
-        Their 95 % intervals (low, high), which take into account that residuals beside each other
-        are alike; high = inf where there is no bound.
+        Their 95 % intervals (low, high), with the correlation of neighbouring residuals; high = inf
+        if there is no bound.
     residuals : ndarray
-        Measured force minus that of the model [N], of the samples that count.
+        Measured force minus force of the model [N], at the samples that count.
     scatter : float
         Standard deviation of the force about the model [N].
     energy : float
         Work of the measured force over a cycle [J]; NaN for less than a cycle.
     cycles : int
-        How many whole cycles there are.
+        Number of whole cycles.
     notes : tuple of Note
-        What was done to the loop, what it leaves open, and what speaks against the model.
+        What was changed in the loop, what it does not determine, and what contradicts the model.
     contact : str
         "spring" or "ball".
     loop : dict of ndarray
@@ -54,10 +54,10 @@ class LoopFit(Result):
     loop: dict[str, Array]
 
     def plot(self, ax: Any = None) -> Any:
-        """Return the measured loop and that of the model, and below them the residuals.
+        """Plot the measured loop and the loop of the model, and below them the residuals.
 
-        ``ax`` are two axes of matplotlib, or one, which gets no residuals, or new ones; the upper
-        ones are returned.
+        ``ax`` is a pair of matplotlib axes, or one (then no residuals are drawn), or None for new
+        ones.  The upper axes are returned.
         """
         title = f"{', '.join(self._texts()[:2])}; {self.contact}"
         x, force, fitted = (self.loop[name] for name in ("displacement", "force", "fitted"))
@@ -71,11 +71,11 @@ class LoopFit(Result):
 
     @property
     def columns(self) -> dict[str, Array]:
-        """The samples that count, with the residuals."""
+        """Return the samples that count, with the residuals."""
         return {**self.loop, "residual": self.residuals}
 
     def _rows(self) -> Rows:
-        """Name, value, unit and interval of each value as text, and the energy."""
+        """Return name, value, unit and interval of each value as text, and the energy."""
         rows: Rows = []
         for name, value in self.values.items():
             low, high = self.interval[name]

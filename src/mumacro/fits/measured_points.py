@@ -1,4 +1,4 @@
-"""Measured points of friction: their columns, checked, and the model at them; for
+"""Check the columns of measured points, and evaluate the model at them, for
 :mod:`mumacro.fits.fit`."""
 
 from collections.abc import Container, Mapping
@@ -23,16 +23,17 @@ from mumacro.surrogate import Surrogate
 
 UNKNOWNS = ("k", "mu0")
 STD = "std"  # the column of standard deviations
-FORCE = "Ft"  # the mean friction force [N], which over Fz is mu_macro
-#: how far a point may lie outside of 0 <= mu_macro <= mu0: in standard deviations; where the
-#: points have none, as a share of mu0
+FORCE = "Ft"  # the mean friction force [N]; divided by Fz it is mu_macro
+#: how far a point may be outside of 0 <= mu_macro <= mu0: in standard deviations, or, if the points
+#: have none, as a fraction of mu0
 _SCATTER, _SHARE = 5.0, 0.05
 MOST_POINTS = 10_000  # of a fit
-_PERCENT = 1.5  # mu_macro from which on it is asked if per cent are meant
-_LEAST, _MOST = 1e-20, 1e20  # friction and std, whose squares and their products must be doubles
+_PERCENT = 1.5  # a larger mu_macro raises the question whether it is in per cent
+# limits of friction and std, so that products of their squares stay within double range
+_LEAST, _MOST = 1e-20, 1e20
 
 
-#: columns of a table of points, and the input whose units each has
+#: columns of a table of points, and the input whose units each column has
 COLUMNS = {name: MEASURED_AS.get(name, name) for name in (*NAMES, AMPLITUDE)}
 COLUMNS |= {"mu_macro": "mu0", STD: "mu0", FORCE: "Fz"}
 _COLUMN_NAMES = ColumnNames(COLUMNS, (("v0",), ("mu_macro", FORCE)))
@@ -43,9 +44,9 @@ def read_points(
     dialect: Dialect = Dialect(),  # noqa: B008
     most: Most = Most(),  # noqa: B008
 ) -> TableOfNumbers:
-    """Return measured points in a table as text, or in a workbook: a file or its bytes.
+    """Return measured points from a table as text or from a workbook: a file or its bytes.
 
-    TextError tells what is wrong, and in which lines.
+    Raise TextError with what is wrong, and in which lines.
 
     >>> read_points(b"v0 [mm/s],mu_macro\\n10,0.2\\n").columns
     {'v0': array([0.01]), 'mu_macro': array([0.2])}
@@ -54,17 +55,17 @@ def read_points(
 
 
 def unknowns_beside(columns: Container[str]) -> list[str]:
-    """Return the unknowns by default: k and mu0, or k alone where mu0 is a column."""
+    """Return the default unknowns: k and mu0, or k alone if mu0 is a column."""
     return [name for name in UNKNOWNS if name != "mu0" or name not in columns]
 
 
 class Measured:
-    """Points (n,) with their friction, and the model at them; parameters and errors are those of
-    :func:`mumacro.fit`.
+    """Hold points (n,) with their friction, and evaluate the model at them.  Parameters and errors
+    are those of :func:`mumacro.fit`.
 
-    ``columns`` has the known inputs [SI], (n,), by the names that ``evaluate`` takes; ``mu`` is
-    mu_macro [-], ``std`` its standard deviations or None, ``weight`` one over them, or 1;
-    ``amplitude`` is the name of the oscillation's input: y0, or Fz_amplitude.
+    ``columns`` has the known inputs [SI], (n,), by the names that ``evaluate`` takes.  ``mu`` is
+    mu_macro [-], ``std`` its standard deviations or None, ``weight`` is 1 / std, or 1.
+    ``amplitude`` is the name of the oscillation's input: y0 or Fz_amplitude.
     """
 
     def __init__(
@@ -140,9 +141,9 @@ class Measured:
         return inputs
 
     def _read(self, data: dict[str, Any]) -> None:
-        """Read columns of one length, (n,), in SI."""
+        """Read columns of the same length, (n,), in SI."""
         columns = {name: to_si(name, data.pop(name)) for name in ("mu_macro", STD) if name in data}
-        # labels are dropped: a fit is not labelled
+        # labels are dropped, since a fit has none
         values = {name: to_si(name, x) for name, x in data.items()}
         inputs = {**values, **dict.fromkeys(self.unknowns, 1.0)}
         self._has_f = inputs.get("f") is not None
@@ -211,7 +212,7 @@ class Measured:
             _refuse("mu_macro", self.mu, self.mu <= top + scatter, bound)
 
     def remarks(self) -> list[Note]:
-        """Return what is probably a wrong unit in the points."""
+        """Return remarks where the points probably have a wrong unit."""
         doubts = remarks(self.columns, self._has_f)
         doubtful = self.mu > _PERCENT
         if not doubtful.any():
@@ -225,8 +226,8 @@ class Measured:
         return [Note(REMARK, text, UNITS, "mu_macro", cases=cases), *doubts]
 
     def elsewhere(self, cases: Any, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the inputs of :meth:`model` at other places: those given, the others as at all
-        points."""
+        """Return the inputs for :meth:`model` at other points: the ones in the call, and for the
+        rest the value that all points have."""
         names = [*self.columns, "f"]
         for name in inputs:
             if name in self.unknowns:
@@ -267,7 +268,7 @@ class Measured:
     def model(
         self, values: Mapping[str, float], columns: Mapping[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        """Return mu_macro, and its slopes along the unknowns."""
+        """Return mu_macro, and its derivatives with respect to the unknowns."""
         inputs: dict[str, Any] = {**columns, **values, **self.kind.names}
         answer = self.surrogate.evaluate(**inputs, gradient=True)
         slopes = {
@@ -279,8 +280,9 @@ class Measured:
     def model_along(
         self, name: str, x: Array, mu0: Array | None = None, slopes: bool = True
     ) -> tuple[Array, Array]:
-        """Return mu_macro at values ``x`` (m,) of one unknown, and its slope along it, zero unless
-        asked for: (m, n) each; at ``mu0`` (m,) where that is unknown, too."""
+        """Return mu_macro at values ``x`` (m,) of one unknown, and its derivative with respect to
+        it (zero if ``slopes`` is False): (m, n) each.  If mu0 is unknown, too, ``mu0`` (m,) has its
+        values."""
         rows = {name: x[:, None]} | ({} if mu0 is None else {"mu0": mu0[:, None]})
         inputs: dict[str, Any] = {**self.columns, **self.kind.names, **rows}
         answer = self.surrogate.evaluate(**inputs, gradient=slopes)
@@ -289,14 +291,14 @@ class Measured:
 
 
 def _friction(force: Any, load: Any) -> Any:
-    """Return mu_macro, as the friction force over the normal force; their deviations have no
-    meaning here."""
+    """Return mu_macro, the friction force divided by the normal force.  Deviations of the two have
+    no meaning here."""
     if load is None:
         raise InputError("Fz", None, f"given beside {FORCE}: mu_macro is {FORCE}/Fz")
     above, below = np.asarray(to_si(FORCE, force)), np.asarray(to_si("Fz", load))
     if above.ndim and below.ndim and above.shape != below.shape:
         raise InputError("data", (above.shape, below.shape), "columns of one length")
-    with np.errstate(all="ignore"):  # a load that is no number is refused by its name
+    with np.errstate(all="ignore"):  # a load that is not a number is refused later, with its name
         return np.where(below > 0.0, above / below, 0.0)
 
 

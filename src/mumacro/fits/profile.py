@@ -1,16 +1,16 @@
-"""The least chi2 over a curve of contacts, sampled where it matters: its minima, and the range that
-the points allow.
+"""Compute the least chi2 over a curve of contacts, with samples where they matter: find its minima,
+and the range that the points allow.
 
-A contact on the curve has a place s, the logarithm of k, of mu0 or of k/mu0.  Its friction at n
-points is a row of n numbers, so the contacts form a line in n dimensions, and chi2 is the square of
-the distance to the measured point.  Where k and mu0 are both unknown friction is mu0 mu~(k/mu0):
-mu0 is a factor of the row, and the best factor follows from a linear equation.
+A contact on the curve has a place s: the logarithm of k, of mu0 or of k/mu0.  Its friction at n
+points is a row of n numbers.  So the contacts form a line in n dimensions, and chi2 is the squared
+distance from this line to the measured point.  If k and mu0 are both unknown, friction is mu0
+mu~(k/mu0): mu0 is a factor of the row, and the best factor follows from a linear equation.
 
-Between two samples the line is close to their chord.  A chord has one nearest place, in closed
-form, and the slopes at its ends tell how far the line may leave it.  So a chord is halved only
-while the line may come near the measured point and leave the chord by more than matters there.
-A valley is found however narrow it is, as long as the slopes at the samples on both sides show the
-turn.
+Between two samples the line is close to a straight chord.  The point of the chord that is nearest
+to the measured point has a closed form.  The derivatives at the two samples tell how far the line
+may be from the chord.  A chord is halved only if the line may come near the measured point, and if
+its distance from the chord may be large enough to matter.  So every valley is found, however narrow
+it is, provided that the derivatives on both sides of it show the turn.
 """
 
 import math
@@ -22,26 +22,27 @@ import numpy as np
 from mumacro.errors import missing
 from mumacro.kernel.arrays import Array, Bools, Places
 
-CONFIDENCE = 0.95  # of intervals, and of the solutions that are kept
+CONFIDENCE = 0.95  # the probability of intervals, and of the solutions that are kept
 _ROUNDS = 40
-_NARROWEST = 1e-6  # in s: a shorter chord is not halved
-# as shares of the rise of chi2 that is allowed: a dip that counts as no minimum, and what the error
-# of a chord may change chi2
+_NARROWEST = 1e-6  # a chord that is shorter in s is not halved
+# Relative to the allowed rise of chi2: a smaller dip is not a minimum; the error of a chord may
+# change chi2 by this much.
 _RIPPLE = 1e-9
 _FINE = 0.1
-_ZOOM, _ZOOMS = 9, 3  # places and rounds of the search for the end of an interval
-_LOWEST_ROUNDS = 14  # of the search for the least chi2: its interval becomes 4^14 times as narrow
-_SAME = 1e-12  # a smaller relative fall of chi2 is rounding
-_INSIDE = 32  # places, at least, in the ranges that are allowed
+_ZOOM, _ZOOMS = 9, 3  # samples and rounds of the search for the end of an interval
+# rounds of the search for the least chi2: its interval becomes 4^14 times narrower
+_LOWEST_ROUNDS = 14
+_SAME = 1e-12  # a smaller relative decrease of chi2 is a rounding error
+_INSIDE = 32  # least number of samples in the allowed ranges
 
-#: s (m,), whether slopes are asked for -> friction over its standard deviation, and its slope along
-#: s or zero: (m, n) each
+#: s (m,), whether slopes are wanted -> friction over its standard deviation, and its derivative
+#: with respect to s, or zero: (m, n) each
 Model = Callable[[Array, bool], tuple[Array, Array]]
-#: places, factors and half widths of the factors (m,) -> what is to be as large as possible (m,)
+#: places, factors and half widths of the factors (m,) -> the quantity to maximise (m,)
 Goal = Callable[[Array, Array, Array], Array]
 
 
-# the least, with its sign turned, and the largest value
+# for each value: minus its minimum, and its maximum
 _ALONE: tuple[Goal, ...] = (lambda s, _, __: -np.exp(s), lambda s, _, __: np.exp(s))
 _WITH_FACTOR: tuple[Goal, ...] = (
     lambda s, factor, off: np.exp(s) * np.minimum(off - factor, 0.0),
@@ -52,24 +53,25 @@ _WITH_FACTOR: tuple[Goal, ...] = (
 
 
 def _dots(a: Array, b: Array) -> Array:
-    """Return the products of the rows of two arrays (m, n), (m,), without an array of this size."""
+    """Return the scalar product of each row of one array with the same row of the other, (m,),
+    without a temporary array (m, n)."""
     return np.asarray(np.einsum("ij,ij->i", a, b))
 
 
 class ProfileSamples(NamedTuple):
-    """The curve at places ``s`` (m,), ascending; the last may be infinite."""
+    """Hold samples of the curve at places ``s`` (m,), ascending; the last one may be infinite."""
 
     s: Array
     rows: Array  #: friction over its standard deviation, without the factor (m, n)
-    slopes: Array  #: their slopes along s (m, n)
-    factor: Array  #: the best factor, 1 where there is none (m,)
+    slopes: Array  #: derivatives of the rows with respect to s (m, n)
+    factor: Array  #: the best factor, or 1 if there is no factor (m,)
     chi2: Array  #: (m,)
     tilt: Array  #: d chi2 / d s (m,)
-    rise: Array  #: chi2 rises with the factor by rise (factor - best)^2; infinite without one (m,)
+    rise: Array  #: chi2 = least + rise (factor - best)^2; infinite if there is no factor (m,)
 
 
 class Profile:
-    """Least chi2 over the places of a curve.
+    """Find the least chi2 over the places of a curve.
 
     Parameters
     ----------
@@ -80,8 +82,8 @@ class Profile:
         Whether each row may be multiplied by a factor >= 0, the second unknown.
     s : ndarray
         First places (m,), ascending.
-    allowed : callable
-        The chi2 up to which a contact is allowed, from the least chi2.
+    limit_of : callable
+        Takes the least chi2, returns the chi2 up to which a contact is allowed.
     """
 
     def __init__(
@@ -102,11 +104,12 @@ class Profile:
 
     @property
     def limit(self) -> float:
-        """The chi2 up to which a contact is allowed."""
+        """Return the chi2 up to which a contact is allowed."""
         return self._limit_of(float(self.samples.chi2.min()))
 
     def sample(self, s: Array, slopes: bool = True) -> ProfileSamples:
-        """Return the curve at places ``s`` (m,); slopes and tilt are zero unless asked for."""
+        """Return the curve at places ``s`` (m,); slopes and tilt are zero if ``slopes`` is False.
+        """
         rows, steps = self._model(s, slopes)
         squares = _dots(rows, rows)
         factor: Array = np.ones(s.size)
@@ -121,12 +124,12 @@ class Profile:
         return ProfileSamples(s, rows, steps, factor, chi2, tilt, rise)
 
     def lowest(self) -> Places:
-        """Return the samples that are minima."""
+        """Return the indices of the samples that are minima."""
         chi2 = np.concatenate(([np.inf], self.samples.chi2, [np.inf]))
         return np.flatnonzero((chi2[1:-1] < chi2[:-2]) & (chi2[1:-1] <= chi2[2:]))
 
     def ridge(self, one: int, other: int) -> float:
-        """Return the largest chi2 on the way from one sample to another."""
+        """Return the largest chi2 between one sample and another."""
         return float(self.samples.chi2[min(one, other) : max(one, other) + 1].max())
 
     # --- sampling ---------------------------------------------------------------------------------
@@ -155,8 +158,8 @@ class Profile:
             self._insert(self.samples.s[:-1][halved] + 0.5 * width[halved])
 
     def _chords(self) -> tuple[Array, Array, Array]:
-        """Return of each chord the distance of the measured point, how far the line may leave
-        it, and its width; (m - 1,) each."""
+        """Return three numbers for each chord, (m - 1,) each: the distance from the measured point
+        to it, a bound for the distance of the line from it, and its width in s."""
         a, b = self.samples.rows[:-1], self.samples.rows[1:]
         chord, width = b - a, np.diff(self.samples.s)
         m = self._measured
@@ -175,7 +178,8 @@ class Profile:
             inner -= m
             near = np.sqrt(_dots(inner, inner))
             near = np.fmin(near, np.sqrt(np.minimum(self.samples.chi2[:-1], self.samples.chi2[1:])))
-            # a corner between straight ends leaves the chord by half of the larger difference
+            # the worst case, a corner between straight parts, is off by half of the larger
+            # difference
             off = []
             for end in (self.samples.slopes[:-1], self.samples.slopes[1:]):
                 way = width[:, None] * end
@@ -187,8 +191,8 @@ class Profile:
         return near, np.where(width > 0.0, error, 0.0), width
 
     def _minima(self) -> Array:
-        """Return where chi2 turns from falling to rising, if that is allowed and more than a
-        ripple."""
+        """Return the places where chi2 turns from falling to rising, if it is allowed there and the
+        dip is more than a ripple."""
         near, error, width = self._chords()
         ripple = _RIPPLE * (self.limit - self.samples.chi2.min())
         depth = self.samples.tilt[:-1] * width, self.samples.tilt[1:] * width
@@ -197,8 +201,8 @@ class Profile:
         return self._zeros(np.flatnonzero(turns), lambda samples: samples.tilt, 1e-13, slopes=True)
 
     def _lowest_places(self) -> Array:
-        """Return where chi2 is least beside each sample that is a minimum and allowed: the curve
-        may bend between two samples, and its slope jump, so their slopes say nothing of it."""
+        """Return the places of least chi2 next to each allowed minimum among the samples.  The
+        curve may have a kink between two samples, so their derivatives do not show this place."""
         s, here = self.samples.s, self.lowest()
         here = here[(self.samples.chi2[here] <= self.limit) & np.isfinite(s[here])]
         ends = np.flatnonzero(np.isfinite(s))[[0, -1]]
@@ -220,13 +224,13 @@ class Profile:
         tolerance: float,
         slopes: bool,
     ) -> Array:
-        """Return places in the chords at which a quantity passes through zero."""
+        """Return the places in the given chords where a quantity is zero."""
         from scipy.optimize import brentq
 
         s, f = self.samples.s.tolist(), quantity(self.samples).tolist()
 
         def zero(i: int) -> float:
-            # computed again, these two may differ by rounding
+            # a second evaluation may differ from the first by a rounding error
             known = {s[i]: f[i], s[i + 1]: f[i + 1]}
 
             def value(place: float) -> float:
@@ -241,10 +245,10 @@ class Profile:
     # --- ranges -----------------------------------------------------------------------------------
 
     def ranges(self) -> list[tuple[float, float]]:
-        """Return the smallest and the largest value among the contacts that are allowed: of e^s, or
-        where there is a factor of e^s times the factor, and of the factor.
+        """Return the smallest and the largest allowed value of e^s.  If there is a factor, return
+        this for e^s times the factor, and for the factor.
 
-        Where the last place, of infinite s, is allowed the first has no upper bound.
+        If the sample at infinite s is allowed, the first value has no upper bound.
         """
         samples, inside = self.samples, self.samples.chi2 <= self.limit
         finite = np.isfinite(samples.s)
@@ -263,7 +267,7 @@ class Profile:
         return [*zip(low, high, strict=True)]
 
     def _ends(self, goals: Sequence[Goal]) -> list[float]:
-        """Return the largest value of each goal over the contacts that are allowed, of finite s."""
+        """Return the largest value of each goal over the allowed contacts of finite s."""
         inside = self.samples.chi2 <= self.limit
         s = self._allowed_places(inside)
         samples = self.sample(s, slopes=False)
@@ -273,7 +277,7 @@ class Profile:
         best = [
             float(self._values(goal, samples)[i]) for goal, i in zip(goals, starts, strict=True)
         ]
-        for _ in range(_ZOOMS if self._has_factor else 0):  # else the ends are borders
+        for _ in range(_ZOOMS if self._has_factor else 0):  # without a factor the ends are borders
             places = np.linspace(low, high, _ZOOM, axis=1)
             samples = self.sample(places.ravel(), slopes=False)
             for i, goal in enumerate(goals):
@@ -286,13 +290,13 @@ class Profile:
     def _values(self, goal: Goal, samples: ProfileSamples) -> Array:
         spare = self.limit - samples.chi2
         half_width = np.sqrt(np.maximum(spare, 0.0) / samples.rise)
-        # places at the border of what is allowed miss it by a rounding error
+        # at the border of the allowed range chi2 exceeds the limit by a rounding error
         allowed = spare >= -1e-9 * self.limit
         return np.where(allowed, goal(samples.s, samples.factor, half_width), -np.inf)
 
     def _allowed_places(self, inside: Bools) -> Array:
-        """Return finite places that are allowed, ascending: the samples, their borders, and some
-        between."""
+        """Return allowed finite places, ascending: samples, the borders of the allowed ranges, and
+        places between them."""
         finite, limit = np.isfinite(self.samples.s), self.limit
         crossings = np.flatnonzero((inside[:-1] != inside[1:]) & finite[1:])
         borders = self._zeros(crossings, lambda samples: samples.chi2 - limit, 1e-9, slopes=False)
@@ -303,8 +307,8 @@ class Profile:
 
 
 def quantile(dof: int | None) -> float:
-    """Return half width of a 95 % interval in standard deviations: of Student's t, or of the normal
-    distribution."""
+    """Return the half width of a 95 % interval in standard deviations, from Student's distribution
+    or, without ``dof``, the normal distribution."""
     try:
         from scipy.special import ndtri, stdtrit
     except ModuleNotFoundError as error:

@@ -1,8 +1,8 @@
-"""The compiled kernel, and the only Python that calls it.
+"""Hold the compiled kernel, and the only Python code that calls it.
 
-Read ``kernel.c`` first: it includes the other files in an order in which each needs only those
-before it.  ``level.c`` is compiled once for each instruction level, ``dispatch.c`` chooses one when
-the library is loaded.
+Read ``kernel.c`` first.  It includes the other files in such an order that each needs only the
+files before it.  ``level.c`` is compiled once for each instruction set; ``dispatch.c`` chooses one
+when the library is loaded.
 
 - ``data.h``, ``records.h``, ``mumacro.h``: a table in memory, a quantity, what C programs call
 - ``lanes.h``, ``arithmetic.c``, ``closed_forms.c``: several points at once, functions, formulas

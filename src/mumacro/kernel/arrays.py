@@ -1,4 +1,5 @@
-"""The types of arrays, and arrays as the kernel takes them: of one shape, flat and contiguous."""
+"""Define the types of arrays, and make arrays as the kernel takes them: of one shape, flat and
+contiguous."""
 
 from collections.abc import Iterable
 
@@ -12,7 +13,7 @@ Places = NDArray[np.intp]
 
 
 def common_shape(arrays: Iterable[Array]) -> tuple[int, ...]:
-    """Return the shape to which arrays broadcast; ValueError where they do not."""
+    """Return the shape to which arrays broadcast.  Raise ValueError if they do not."""
     shapes = {array.shape for array in arrays}
     shapes.discard(())
     if len(shapes) > 1:
@@ -21,7 +22,7 @@ def common_shape(arrays: Iterable[Array]) -> tuple[int, ...]:
 
 
 def flat(array: Array, shape: tuple[int, ...]) -> Array:
-    """Return ``array`` broadcast to ``shape``, as flat, contiguous and aligned."""
+    """Return ``array`` broadcast to ``shape``, then made flat, contiguous and aligned."""
     if array.shape != shape:
         array = np.broadcast_to(array, shape)
     if not array.flags.carray:

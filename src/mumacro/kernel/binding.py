@@ -1,10 +1,9 @@
-"""The compiled kernel: ``mumacro/kernel/*.c`` as a shared object.  Only this module calls it.
+"""Call the compiled kernel: ``mumacro/kernel/*.c`` as a shared object.  Only this module calls it.
 
-It knows nothing of Python; :mod:`cffi` opens it by the declarations of ``kernel/data.h``,
+The kernel does not use Python. :mod:`cffi` opens it with the declarations of ``kernel/data.h``,
 ``records.h`` and ``library.h``, which hatch_build.py has parsed into ``_declarations.py``.  A call
-runs without the interpreter's lock.  There is a kernel for every instruction level of the
-processor; the best one is used, and those with fused multiply-add (AVX2, AVX-512, NEON) give the
-same bits.
+releases the interpreter's lock.  There is a kernel for every instruction set of the processor; the
+best one is used.  The ones with fused multiply-add (AVX2, AVX-512, NEON) give the same bits.
 """
 
 import sys
@@ -16,9 +15,9 @@ import numpy as np
 
 from mumacro.kernel.arrays import Array, Codes
 
-ROOM = 200_000  # steps of a period of a motion, at most
-# steps that the search for the steady cycle of a motion tries, at most: 2 to 6 s; a step counts as
-# often as the motion has harmonics and once more
+ROOM = 200_000  # largest number of steps in a period of a motion
+# largest number of steps in the search for the steady cycle of a motion: 2 to 6 s; a step counts
+# (harmonics + 1) times
 MOST_STEPS = 50_000_000
 
 _HERE = Path(__file__).resolve().parent.parent
@@ -26,7 +25,7 @@ _SHARED_OBJECT = _HERE / ("_kernel.dll" if sys.platform == "win32" else "_kernel
 
 
 def _opened() -> tuple[Any, Any]:
-    """Return cffi with the declarations, and the shared object."""
+    """Return the shared object, and cffi with its declarations."""
     try:
         from mumacro.kernel._declarations import ffi
 
@@ -38,7 +37,7 @@ def _opened() -> tuple[Any, Any]:
 
 
 def _why_unopened(error: Exception) -> str:
-    """Say in one line which folder was imported and what to do about it."""
+    """Return one line that says which folder was imported and what to do about it."""
     if not _SHARED_OBJECT.exists() and (_HERE / "kernel" / "kernel.c").exists():
         return (
             f"mumacro: the compiled kernel {_SHARED_OBJECT.name} is missing: Python imported the "
@@ -66,7 +65,7 @@ def _numbers(array: Array | None) -> Any:
 
 
 def _harmonics(orders: Sequence[Sequence[int]]) -> tuple[Any, Any]:
-    """Return how many harmonics x, y and the normal force have, and all of them."""
+    """Return the numbers of harmonics of x, y and the normal force, and the list of all of them."""
     all_orders = [float(order) for part in orders for order in part]
     return _FFI.new("int32_t[3]", [len(part) for part in orders]), _FFI.new(
         "double[]", all_orders or [0.0]
@@ -74,15 +73,15 @@ def _harmonics(orders: Sequence[Sequence[int]]) -> tuple[Any, Any]:
 
 
 def _out(rows: Sequence[Array], start: int) -> tuple[Any, int]:
-    """Return where the kernel writes rows of one array from column ``start`` on, and their
-    stride."""
+    """Return a pointer to the place where the kernel writes rows of an array, from column ``start``
+    on, and the stride of the rows."""
     whole = np.asarray(rows[0].base)
     return _numbers(whole) + start, whole.shape[1]
 
 
 def _columns_of(columns: Sequence[Array | float], start: int) -> Any:
-    """Return six columns, (n,) or one number, from ``start`` on as a ``mumacro_columns``, which is
-    valid as long as they are."""
+    """Return a ``mumacro_columns`` that points to six columns, (n,) or one number each, from
+    ``start`` on.  It is valid as long as the columns exist."""
     of_kernel = _new(_COLUMNS)
     arrays, constants = of_kernel.array, of_kernel.constant
     for i, column in enumerate(columns):
@@ -95,7 +94,8 @@ def _columns_of(columns: Sequence[Array | float], start: int) -> Any:
 
 
 def _record(enum: str, prefix: str, end: str) -> np.dtype[np.void]:
-    """Return a row of doubles with the names of an enum, in which ``end`` counts all columns."""
+    """Return the type of a row of doubles that have the names of an enum; ``end`` is the enum's
+    count of columns."""
     places = dict(_FFI.typeof(f"enum {enum}").relements)
     columns = places.pop(end)
     return np.dtype(
@@ -108,14 +108,14 @@ def _record(enum: str, prefix: str, end: str) -> np.dtype[np.void]:
     )
 
 
-#: rows of :class:`Data`'s blocks and pieces of the border, see ``kernel/data.h``
+#: types of the rows in the blocks and the border pieces of :class:`Data`, see ``kernel/data.h``
 BLOCK_ROW = _record("mumacro_block_column", "MU_", "MU_BLOCK_COLUMNS")
 PIECE_ROW = _record("mumacro_piece_column", "MU_PIECE_", "MU_PIECE_COLUMNS")
 
 _ROW = _FFI.typeof("enum mumacro_row").relements
 _SLOPE_ROWS = _FFI.typeof("enum mumacro_slope_row").relements["MU_SLOPE_ROWS"]
 _EXTREME_ROWS = _FFI.typeof("enum mumacro_extreme_row").relements["MU_EXTREME_ROWS"]
-#: how much of an answer is wanted, and the first row that is not filled then
+#: the detail of an answer, and the first row that is not filled for it
 Detail = Literal["values", "groups", "gradient"]
 _END: dict[Detail, int] = {
     "values": _ROW["MU_ROW_V_TILDE"],
@@ -125,7 +125,8 @@ _END: dict[Detail, int] = {
 
 
 class _Rows:
-    """A row of :class:`CaseRows` by its name in ``mumacro_row``, or all rows up to another."""
+    """Give access to a row of :class:`CaseRows` by its name in ``mumacro_row``, or to all rows up
+    to another."""
 
     def __init__(self, name: str, end: str = "") -> None:
         self._place = slice(_ROW[name], _ROW[end]) if end else _ROW[name]
@@ -136,11 +137,11 @@ class _Rows:
 
 
 class CaseRows:
-    """Answers to cases of one shape, which :meth:`Kernel.cases` fills in.
+    """Hold the answers to cases of one shape; :meth:`Kernel.cases` fills them in.
 
-    ``v_tilde``, ``y_tilde`` and ``length_scale`` are there from the detail "groups" on,
-    ``gradient`` and ``gradient_bound``, six rows each, for "gradient".  ``source`` holds codes, -1
-    for an illegal case, whose numbers are NaN.
+    ``v_tilde``, ``y_tilde`` and ``length_scale`` exist for the details "groups" and "gradient";
+    ``gradient`` and ``gradient_bound``, six rows each, for "gradient". ``source`` holds codes; an
+    illegal case has -1, and its numbers are NaN.
     """
 
     __slots__ = ("numbers", "source")
@@ -167,13 +168,13 @@ class CaseRows:
 
     @classmethod
     def empty(cls, shape: tuple[int, ...], detail: Detail = "values") -> Self:
-        """Return room for the answers to cases of a shape."""
+        """Return empty arrays for the answers to cases of a shape."""
         return cls(np.empty((_END[detail], *shape)), np.empty(shape, np.int8))
 
 
 class SlopeRows(NamedTuple):
-    """A quantity, its slopes v~ d/d v~ and y~ d/d y~, and the bounds of these two, (n,) each, in
-    the order of ``mumacro_slope_row``."""
+    """Hold a quantity, its derivatives v~ d/d v~ and y~ d/d y~, and the bounds of these two, (n,)
+    each, in the order of ``mumacro_slope_row``."""
 
     value: Array
     along_v: Array
@@ -183,13 +184,13 @@ class SlopeRows(NamedTuple):
 
     @classmethod
     def empty(cls, n: int) -> Self:
-        """Return room for n points."""
+        """Return empty arrays for n points."""
         return cls(*np.empty((_SLOPE_ROWS, n)))
 
 
 class ExtremeRows(NamedTuple):
-    """Smallest and largest mu_macro over intervals of k, and the largest bound met there, (n,)
-    each, in the order of ``mumacro_extreme_row``."""
+    """Hold the smallest and largest mu_macro over intervals of k, and the largest bound in the
+    interval, (n,) each, in the order of ``mumacro_extreme_row``."""
 
     low: Array
     high: Array
@@ -197,23 +198,23 @@ class ExtremeRows(NamedTuple):
 
     @classmethod
     def empty(cls, n: int) -> Self:
-        """Return room for n intervals."""
+        """Return empty arrays for n intervals."""
         return cls(*np.empty((_EXTREME_ROWS, n)))
 
 
 class Data:
-    """A table as the kernel reads it.
+    """Hold a table as the kernel reads it.
 
-    ``border``: polynomials of v~crit (cells, 8), highest power first.  ``pieces`` (3,
-    columns): rows of ``PIECE_ROW``.  ``blocks`` (sources + 1, columns): rows of ``BLOCK_ROW``,
-    zero where no cells.  ``outer``: the two terms of large speed, (cells, 2, 8).
+    ``border``: polynomials of v~crit (cells, 8), highest power first.  ``pieces`` (3, columns):
+    rows of ``PIECE_ROW``.  ``blocks`` (sources + 1, columns): rows of ``BLOCK_ROW``, zero if the
+    block has no cells.  ``outer``: the two terms of large speed, (cells, 2, 8).
     """
 
     def __init__(self, border: Array, pieces: Array, blocks: Array, outer: Array) -> None:
         self.pointer = _FFI.new("mumacro_data *")
         self._pointers: list[Any] = []
-        #: polynomials (cells, 8, 8), errors (sources + 1, 2), errors in every cell (cells, 3) by
-        #: code of the quantity
+        #: polynomials (cells, 8, 8), errors (sources + 1, 2), and errors in each cell (cells, 3),
+        #: by code of the quantity
         self.quantities: dict[int, tuple[Array, Array, Array]] = {}
         self.border, self.pieces, self.blocks, self.outer = (
             self._keep(self.pointer, name, array)
@@ -239,12 +240,13 @@ class Data:
         )
 
     def add_driven_rule(self, points: Array) -> None:
-        """Add the rule of a ball that is shaken along, see ``mumacro_driven_rule``."""
+        """Add the quadrature rule for a ball that is shaken along, see ``mumacro_driven_rule``."""
         self._keep(self.pointer.driven, "points", points)
         self.pointer.driven.nodes = points.shape[0]
 
     def _keep(self, place: Any, name: str, array: Array) -> Array:
-        """Return point ``place.name`` to the numbers, which live as long as this object."""
+        """Set the pointer ``place.name`` to the numbers of an array, and keep the array alive as
+        long as this object."""
         array = np.require(array, np.float64, ["C", "A"])
         pointer = _numbers(array)
         setattr(place, name, pointer)
@@ -253,8 +255,8 @@ class Data:
 
 
 class Kernel:
-    """The functions of one instruction level; arrays are contiguous float64 (sources: int8), of one
-    length.
+    """Call the functions of one instruction set.  Arrays are contiguous float64 (sources: int8), of
+    one length.
 
     Illegal points and cases give NaN and the source -1.  See ``kernel/library.h``.
     """
@@ -267,19 +269,19 @@ class Kernel:
         self._values, self._one, self._cases = functions.values, functions.one, functions.cases
 
     def text(self, pointer: Any) -> str:
-        """Return a text of the kernel."""
+        """Return a text of the kernel as a Python string."""
         return str(_FFI.string(pointer).decode())
 
     def chart(self, contact: int, place: int) -> Any:
-        """Return a block of a contact; null beyond the last."""
+        """Return a block of a contact; null after the last one."""
         return self._functions.chart(contact, place)
 
     def source(self, code: int) -> Any:
-        """Return where an answer comes from; its name is null beyond the last."""
+        """Return the source of an answer by its code; its name is null after the last one."""
         return self._functions.source(code)
 
     def quantity(self, code: int) -> Any:
-        """Return the record of a quantity; null beyond the last."""
+        """Return the record of a quantity; null after the last one."""
         return self._functions.quantity(code)
 
     def values(
@@ -293,10 +295,10 @@ class Kernel:
         source: Codes | None,
         kind: tuple[int, int] = (0, 0),
     ) -> None:
-        """Evaluate a quantity at points (n,): fill ``value``, its ``bound`` and the ``source``,
-        where wanted.
+        """Evaluate a quantity at points (n,): fill ``value``, and ``bound`` and ``source`` if they
+        are not None.
 
-        Of another ``kind``, see :meth:`cases`, all three are.
+        For another ``kind``, see :meth:`cases`, fill all three.
         """
         codes = _NOTHING if source is None else _from_buffer(_CODES, source)
         arrays = _numbers(v), _numbers(y), _numbers(value), _numbers(bound), codes
@@ -305,7 +307,7 @@ class Kernel:
     def value(
         self, data: Data, quantity: int, v: float, y: float, contact: int = 0
     ) -> tuple[float, float, int]:
-        """Return a quantity at one point in plain numbers, its bound and the source."""
+        """Return a quantity at one point as plain numbers: value, bound and source."""
         point, code = _new(_POINT, (v, y)), _new(_CODE)
         pointers = point, point + 1, point + 2, point + 3
         self._values(data.pointer, contact, 0, quantity, 1, *pointers, code)
@@ -333,9 +335,9 @@ class Kernel:
         part: slice,
         kind: tuple[int, int] = (0, 0),
     ) -> None:
-        """Evaluate a part of n cases: fill ``answers`` there.
+        """Evaluate a part of n cases and fill ``answers`` there.
 
-        ``columns`` are the six inputs, (n,) or one number.  ``kind``: another contact and
+        ``columns`` are the six inputs, (n,) or one number each.  ``kind`` is another contact and
         direction, see :class:`mumacro.inputs.fields.Kind`.
         """
         start, n = part.start, part.stop - part.start
@@ -353,21 +355,22 @@ class Kernel:
         part: slice,
         kind: tuple[int, int] = (0, 0),
     ) -> None:
-        """Evaluate as :meth:`cases`, with k from its column to ``high`` (n,)."""
+        """Evaluate intervals of k, from its column to ``high`` (n,), in the way of :meth:`cases`.
+        """
         start, n = part.start, part.stop - part.start
         six, ends = _columns_of(columns, start), _numbers(high) + start
         self._functions.intervals(data.pointer, *kind, n, six, ends, *_out(rows, start))
 
     def one(self, pointer: Any, six: Sequence[float], with_gradient: bool, contact: int = 0) -> Any:
-        """Return one case in plain numbers: a ``mumacro_case``, its gradient only where asked
-        for."""
-        # named: a call with *six takes longer
+        """Return one case as plain numbers: a ``mumacro_case``; its gradient is filled only if
+        asked for."""
+        # named arguments: a call with *six takes longer
         answer, (mu0, Fz, k, y0, omega, v0) = _new(_CASE), six
         self._one(pointer, contact, mu0, Fz, k, y0, omega, v0, with_gradient, answer)
         return answer
 
     def border(self, data: Data, y: Array, kind: tuple[int, int] = (0, 0)) -> Array:
-        """Return v~crit at ``y`` (n,): 0 at 0, infinite at infinity, NaN for what is no
+        """Return v~crit at ``y`` (n,): 0 at 0, infinite at infinity, NaN if ``y`` is not an
         amplitude."""
         out = np.empty(y.size)
         self._functions.border_as(data.pointer, *kind, y.size, _numbers(y), _numbers(out))
@@ -376,8 +379,8 @@ class Kernel:
     def places(
         self, data: Data, v: Array, y: Array, contact: int = 0
     ) -> tuple[Codes, Array, Array]:
-        """Return blocks of points (n,) with 0 < v~, y~ < infinity, of a ball those of its middle
-        spring, and their coordinates as evaluation counts them."""
+        """Return the blocks of points (n,) with 0 < v~, y~ < infinity, and the coordinates in the
+        blocks as the evaluation computes them.  For a ball they belong to its middle spring."""
         block, a, b = np.empty(v.size, np.int8), np.empty(v.size), np.empty(v.size)
         codes = _from_buffer(_CODES, block)
         arrays = _numbers(v), _numbers(y), codes, _numbers(a), _numbers(b)
@@ -394,8 +397,8 @@ class Kernel:
         forces: Array,
         sums: Array,
     ) -> None:
-        """Move contacts (n,) by (dx, dy), while their limits go from ``before`` to ``after``:
-        ``forces`` (n, springs, 2) in place, ``sums`` (n, 2) filled."""
+        """Move contacts (n,) by (dx, dy), while their limits change from ``before`` to ``after``.
+        Change ``forces`` (n, springs, 2) in place and fill ``sums`` (n, 2)."""
         arrays = map(_numbers, (before, after, k, dx, dy, forces, sums))
         self._functions.element_steps(before.size, forces.shape[1], *arrays)
 
@@ -409,9 +412,9 @@ class Kernel:
         stop: Any,
         most: int = MOST_STEPS,
     ) -> None:
-        """Compute steady cycles of motions: ``out`` (n, 7) filled from ``cases`` (n, 1 + terms),
-        see ``kernel/library.h``; ``orders`` are the harmonics of x, y and the normal force. A
-        flag ``stop`` that another thread sets ends it."""
+        """Compute steady cycles of motions: fill ``out`` (n, 7) from ``cases`` (n, 1 + terms), see
+        ``kernel/library.h``.  ``orders`` are the harmonics of x, y and the normal force.  Stop
+        early if another thread sets the flag ``stop``."""
         counts, all_orders = _harmonics(orders)
         self._functions.motions(
             contact,
@@ -437,7 +440,8 @@ class Kernel:
         n: int,
         stop: Any,
     ) -> Array:
-        """Return forces (n + 1, 2) of one cycle of a case at equal times, summed over springs."""
+        """Return the forces (n + 1, 2) of one cycle of a case at equally spaced times, summed over
+        springs."""
         forces, (counts, all_orders) = np.empty((n + 1, 2)), _harmonics(orders)
         self._functions.motion_cycle(
             counts,
@@ -458,8 +462,9 @@ class Kernel:
     def loop_forces(
         self, contact: int, p: Array, x: Array, Fz: Array, before: int = 0, start: float = 0.0
     ) -> tuple[Array, Array]:
-        """Return forces over mu0 at samples of the place ``x`` (n,) under the load ``Fz`` (n,), for
-        each p = k / mu0 (m,), and their slopes along ln p, (m, n) both: see ``kernel/loop.c``."""
+        """Return forces divided by mu0, and their derivatives with respect to ln p, (m, n) each,
+        for each p = k / mu0 (m,).  The samples have the displacement ``x`` (n,) and the load ``Fz``
+        (n,).  See ``kernel/loop.c``."""
         force, slope = np.empty((p.size, x.size)), np.empty((p.size, x.size))
         room = np.empty(3 * (x.size + before))
         ends = map(_numbers, (room, force, slope))
@@ -470,14 +475,15 @@ class Kernel:
     # --- for the builder --------------------------------------------------------------------------
 
     def tabulated(self, data: Data, quantity: int, block: int, a: Array, b: Array) -> Array:
-        """Return what ``block`` tabulates at its coordinates (n,) as :meth:`places` gives them."""
+        """Return the tabulated function of ``block`` at its coordinates (n,), as :meth:`places`
+        returns them."""
         q = np.empty(a.size)
         self._functions.tabulated(data.pointer, quantity, block, a.size, *map(_numbers, (a, b, q)))
         return q
 
     def turns_in_stick(self, v: Array, y: Array, stick: Array, bound: Array) -> tuple[Array, Array]:
-        """Return 1 - cos of the angle by which the force of one spring turns in a stick, at points
-        (n,) with their stick fraction and its bound; and what that leaves open."""
+        """Return 1 - cos of the angle by which the force of one spring turns while it sticks, and
+        the bound of its error.  Points (n,) have their stick fraction and its bound."""
         turn, error = np.empty(v.size), np.empty(v.size)
         arrays = map(_numbers, (v, y, stick, bound, turn, error))
         self._functions.turns_in_stick(v.size, *arrays)
@@ -486,8 +492,8 @@ class Kernel:
     def forms(
         self, quantity: int, block: int, v: Array, y: Array, eta: Array, contact: int = 0
     ) -> tuple[Array, Array]:
-        """Return (base, factor) with value = base + factor q in ``block``, any shape; eta = y~ - 1
-        counts in the corner."""
+        """Return (base, factor) of value = base + factor q in ``block``, for arrays of any shape.
+        ``eta`` = y~ - 1 is used in the corner."""
         base, factor = np.empty(v.shape), np.empty(v.shape)
         v, y, eta = (np.ascontiguousarray(x, np.float64) for x in (v, y, eta))
         numbers = map(_numbers, (v, y, eta, base, factor))
@@ -495,8 +501,8 @@ class Kernel:
         return base, factor
 
     def border_scales(self, piece: int, y: Array) -> tuple[Array, Array]:
-        """Return what node values of a piece of the border, and what its cells, are multiplied by
-        to give v~crit, (n,)."""
+        """Return the factors (n,) that give v~crit from the node values of a piece of the border,
+        and from its cells."""
         of_nodes, of_cells = np.empty(y.size), np.empty(y.size)
         self._functions.border_scales(
             piece, y.size, *map(_numbers, (np.ascontiguousarray(y), of_nodes, of_cells))
@@ -504,8 +510,8 @@ class Kernel:
         return of_nodes, of_cells
 
     def cell_shares(self, w: Array) -> tuple[Array, Array]:
-        """Return shares of a cell's largest error that derivatives have at ``w``; in the last cell
-        below the border, (n,)."""
+        """Return the error of derivatives at ``w``, relative to a cell's largest error, in the last
+        cell below the border, (n,)."""
         inside, at_border = np.empty(w.size), np.empty(w.size)
         self._functions.cell_shares(
             w.size, *map(_numbers, (np.ascontiguousarray(w), inside, at_border))
@@ -513,15 +519,15 @@ class Kernel:
         return inside, at_border
 
     def entries(self, t: Array) -> Array:
-        """Return y~ at which rays v~/y~ = t times the steepest enter stick-slip, of any shape, 0 <
-        t <= 1."""
+        """Return y~ at which the ray v~/y~ = t times the steepest one enters stick-slip, for arrays
+        of any shape, 0 < t <= 1."""
         t = np.ascontiguousarray(t, np.float64)
         out = np.empty(t.shape)
         self._functions.entries(t.size, _numbers(t), _numbers(out))
         return out
 
     def normal_form_root(self, v: Array, eta: Array) -> Array:
-        """Return positive root of phi^3 + 2 eta phi = pi v~, (n,)."""
+        """Return the positive root of phi^3 + 2 eta phi = pi v~, (n,)."""
         out = np.empty(v.size)
         self._functions.normal_form_root(v.size, *map(_numbers, (v, eta, out)))
         return out
@@ -534,5 +540,5 @@ class Kernel:
         return out
 
 
-#: the kernels that this processor can run, the best one last
+#: the kernels that this processor can run; the best one is the last
 kernels = [Kernel(one) for one in map(_LIBRARY.mumacro_kernel_at, range(3)) if one != _NOTHING]

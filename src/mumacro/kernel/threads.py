@@ -1,7 +1,7 @@
-"""Arrays: cut into slices, one after another or on several threads; how many threads there are.
+"""Cut arrays into slices and evaluate them, one after another or on several threads.
 
 The kernel releases the interpreter's lock, so several threads can work at once.  They end with the
-call, so that a forked process works and no call waits for another.
+call, so that a process can be forked and no call waits for another.
 """
 
 import functools
@@ -16,26 +16,25 @@ from mumacro.kernel.arrays import Array, Codes
 from mumacro.kernel.binding import CaseRows, Data, Detail, ExtremeRows, SlopeRows, kernels
 from mumacro.stopping import current
 
-SLICE = 16_384  # points of a slice, whose arrays stay in the second-level cache
-ONE_THREAD = 65_536  # points that one thread evaluates before a second one has started
-# the time of a ball that is shaken along, about, divided by that of a spring that is shaken across
+SLICE = 16_384  # points in a slice, so that its arrays stay in the second-level cache
+ONE_THREAD = 65_536  # points that one thread evaluates while a second thread starts
+# approximate time of a ball that is shaken along, divided by that of a spring that is shaken across
 ALONG_COST = 64
-# the time of a case with an interval of k, about, divided by that of a case with one k
+# approximate time of a case with an interval of k, divided by that of a case with one k
 INTERVAL = 64
 _KERNEL = kernels[-1]
 
 
 def _cost(kind: tuple[int, int]) -> int:
-    """Return the time of a point of a kind, about, divided by that of a spring that is shaken
-    across."""
+    """Return the approximate time of a point, divided by that of a spring that is shaken across."""
     contact, direction = kind
     return ALONG_COST if direction else 1 + contact
 
 
 @functools.cache
 def processors() -> int:
-    """Return how many processors this process may use; the limit of a container counts, if the
-    system gives it."""
+    """Return how many processors this process may use, including the limit of a container if the
+    system reports it."""
     count = (
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     )
@@ -49,10 +48,11 @@ def processors() -> int:
 def default_threads() -> int:
     """Return the default number of threads of a call.
 
-    All processors in the main thread of a program.  One in any other thread and in a child process:
-    what started them (Dask, joblib, multiprocessing, a pool of threads) already divides the work.
+    In the main thread of a program it is the number of processors.  In any other thread and in a
+    child process it is one, because what started them (Dask, joblib, multiprocessing, a pool of
+    threads) already divides the work.
     """
-    import multiprocessing  # only arrays ask: one case starts sooner without
+    import multiprocessing  # only arrays need it: without the import one case starts sooner
 
     if (
         threading.current_thread() is not threading.main_thread()
@@ -63,8 +63,8 @@ def default_threads() -> int:
 
 
 def share_out(n: int, threads: int | None, work: Callable[[slice], None], cost: int = 1) -> None:
-    """Call ``work`` with every slice of n points, which cost about ``cost`` times as much as those
-    of one spring; on :func:`default_threads` where ``threads`` is None."""
+    """Call ``work`` with every slice of n points.  A point takes about ``cost`` times as long as a
+    point of one spring.  The default of ``threads`` is :func:`default_threads`."""
     length, stop = SLICE // cost, current()
     stop.look()
     if n <= length:
@@ -81,7 +81,7 @@ def share_out(n: int, threads: int | None, work: Callable[[slice], None], cost: 
         for part in parts:
             work_or_stop(part)
         return
-    from concurrent.futures import ThreadPoolExecutor  # one case starts sooner without
+    from concurrent.futures import ThreadPoolExecutor  # without the import one case starts sooner
 
     with ThreadPoolExecutor(min(workers, len(parts)), thread_name_prefix="mumacro") as pool:
         for _ in pool.map(work_or_stop, parts):
@@ -96,7 +96,8 @@ def values(
     threads: int | None,
     kind: tuple[int, int] = (0, 0),
 ) -> tuple[Array, Array, Codes]:
-    """Return a quantity at (n,) points with its bound and source; NaN and -1 where illegal."""
+    """Return a quantity at (n,) points with its bound and source; NaN and -1 where a point is
+    illegal."""
     value, bound, source = np.empty(v.size), np.empty(v.size), np.empty(v.size, np.int8)
 
     def work(part: slice) -> None:
@@ -111,7 +112,7 @@ def values(
 def values_without_bounds(
     quantity: int, data: Data, v: Array, y: Array, threads: int | None
 ) -> Array:
-    """Return a quantity of one spring at (n,) points; NaN where illegal."""
+    """Return a quantity of one spring at (n,) points; NaN where a point is illegal."""
     value = np.empty(v.size)
     share_out(
         v.size,
@@ -124,7 +125,7 @@ def values_without_bounds(
 def slopes(
     quantity: int, data: Data, v: Array, y: Array, threads: int | None, contact: int = 0
 ) -> SlopeRows:
-    """Return any quantity at (n,) points with its slopes and their bounds."""
+    """Return any quantity at (n,) points with its derivatives and their bounds."""
     rows = SlopeRows.empty(v.size)
     share_out(
         v.size,
@@ -160,8 +161,8 @@ def intervals(
     threads: int | None,
     kind: tuple[int, int] = (0, 0),
 ) -> ExtremeRows:
-    """Return extremes of cases whose k reaches from its column to ``high``, see
-    :meth:`mumacro.kernel.binding.Kernel.intervals`."""
+    """Return the smallest and largest mu_macro of cases whose k extends from its column to
+    ``high``, see :meth:`mumacro.kernel.binding.Kernel.intervals`."""
     rows = ExtremeRows.empty(high.size)
 
     share_out(

@@ -1,10 +1,11 @@
-"""What can be computed of cases: the list, and the one place that computes it.
+"""Compute the outputs of cases.  This package has the list of outputs and the one place that
+computes them.
 
-Each output is an entry in a file of its own: a name, a function, its values by path with unit and
-meaning, its cost, and for which kinds of cases it does not exist and why.  Python, command, files,
-HTTP and page take names, units and words from here, and write the values.  Equation numbers are
-those of Benad, Nakano, Popov, Popov, "Active control of friction by transverse oscillations"
-(Friction, 2018).
+Each output is an entry in its own file: a name, a function, its values by path with unit and
+meaning, its cost, and the cases for which it does not exist, with the reason.  Python, command
+line, files, HTTP and page take names, units and words from here, and write the values.  Equation
+numbers are those of Benad, Nakano, Popov, Popov, "Active control of friction by transverse
+oscillations" (Friction, 2018).
 """
 
 from mumacro.answer import BAND
@@ -17,12 +18,12 @@ from mumacro.outputs.power import POWER
 from mumacro.outputs.settling import SETTLING
 from mumacro.outputs.stick_fraction import STICK_FRACTION
 
-#: by name, in the order in which an answer has them
+#: outputs by name, in the order in which an answer has them
 OUTPUTS: dict[str, Output] = {
     output.name: output
     for output in (GROUPS, LIMITS, GRADIENT, STD, STICK_FRACTION, POWER, SETTLING)
 }
-#: every number of an answer by its path
+#: every number of an answer, by its path
 MEMBERS: dict[str, Member] = {
     "mu_macro": Member("-", "Macroscopic coefficient of friction"),
     "mu_ratio": Member("-", "mu_macro/mu0, from 0 to 1"),

@@ -1,5 +1,5 @@
-"""The standard deviation of mu_macro from independent deviations of the inputs, to first order; and
-where first order is not enough."""
+"""Compute the standard deviation of mu_macro from independent deviations of the inputs, to first
+order, and tell where first order is not enough."""
 
 import math
 from functools import reduce
@@ -12,15 +12,16 @@ from mumacro.notes import REMARK, Note
 from mumacro.outputs.entry import Member, Output, Values
 from mumacro.outputs.evaluated import Evaluated, where
 
-#: how far, in whole deviations, mu_macro one deviation up or down may be from the straight line
+#: limit, as a fraction of the whole deviation, of the difference between mu_macro one deviation up
+#: or down and the straight line
 STRAIGHT = 0.2
 
 
 def std(cases: Evaluated) -> Values:
-    """Return whole deviation, its part that comes from the gradient's bound, and the share of each
-    input in the variance."""
+    """Return the whole deviation, the part of it that comes from the gradient's bound, and the part
+    of the variance that comes from each input."""
     spreads = {name: cases.cases.std.get(name, 0.0) for name in cases.kind.fields}
-    # k has no effect where contact is rigid, nor has an infinite slope where the input is exact
+    # k has no effect on a rigid contact; an infinite slope has none if the input is exact
     exact = {
         name: (cases.rigid & (name == "k")) | (spread == 0.0) for name, spread in spreads.items()
     }
@@ -37,9 +38,9 @@ def std(cases: Evaluated) -> Values:
 
 
 def bent(cases: Evaluated, total: float) -> list[Note]:
-    """Return remarks on one case: the inputs along which first order is not enough, since
-    mu_macro one deviation up or down differs from the slope's by more than a fifth of the whole
-    deviation."""
+    """Return remarks on one case: name the inputs for which first order is not enough.  For such an
+    input mu_macro one deviation up or down differs from the straight line by more than a fifth of
+    the whole deviation."""
     remarks: list[Note] = []
     for name, spread in cases.cases.std.items():
         value = cases.columns[name]

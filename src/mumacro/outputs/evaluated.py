@@ -1,4 +1,4 @@
-"""Cases with their answer, of which outputs are computed."""
+"""Hold cases with their answer, as the functions of the outputs need them."""
 
 import math
 from collections.abc import Callable
@@ -15,10 +15,10 @@ from mumacro.outputs.tabulated import Tabulated
 
 
 class Evaluated:
-    """Cases with their answer: plain numbers for one case, columns (n,) for many.
+    """Hold cases with their answer: plain numbers for one case, columns (n,) for many.
 
-    k is infinite where the contact is rigid.  What is not legal is NaN, with the source code -1.
-    The groups of columns are there for the details "groups" and "gradient", the slopes for
+    k is infinite for a rigid contact.  An illegal case has NaN and the source code -1.  The
+    dimensionless columns exist for the details "groups" and "gradient", the derivatives for
     "gradient"; mu_macro_low and mu_macro_high for an interval of k.
     """
 
@@ -58,32 +58,34 @@ class Evaluated:
             self._over_interval()
 
     def _over_interval(self) -> None:
-        """Compute the extremes of mu_macro, and the largest bound that was met there."""
+        """Compute the smallest and largest mu_macro over the interval, and the largest bound in it.
+        """
         low, high, bound = self.tabulated.extremes(self.cases)
         take = np.ravel if self.cases.shape else _item
-        # of an interval of one point, rigid contact among them, there may be none
+        # an interval of one point, or a rigid contact, may have no result of the kernel
         self.mu_macro_low = take(np.fmin(self.mu_macro, low))
         self.mu_macro_high = take(np.fmax(self.mu_macro, high))
         self.error_bound = take(np.fmax(self.error_bound, bound))
 
     @cached_property
     def moving(self) -> Any:
-        """Whether something oscillates."""
+        """Return whether anything oscillates."""
         amplitude = self.columns[AMPLITUDE if self.kind.normal else "y0"]
         return (amplitude != 0.0) & (self.columns["omega"] != 0.0)
 
     @cached_property
     def rigid(self) -> Any:
-        """Whether the contact is rigid."""
+        """Return whether the contact is rigid."""
         return self.columns["k"] == math.inf
 
     @cached_property
     def usable(self) -> Any:
-        """Whether it is elastic and oscillates, with groups within double range."""
+        """Return whether the contact is elastic and oscillates, with v~ and y~ within double range.
+        """
         return (self.y_tilde < math.inf) & self.moving
 
     def quantity(self, name: str, v: Any, y: Any, kind: Any = None) -> tuple[Any, Any]:
-        """Return a tabulated quantity at groups in the shape of the cases, and its bound."""
+        """Return a tabulated quantity at v~ and y~ in the shape of the cases, and its bound."""
         kind = self.kind if kind is None else kind
         if not self.cases.shape:
             return self.tabulated.value(name, v, y, kind)[:2]
@@ -95,7 +97,7 @@ class Evaluated:
         return crit if self.cases.shape else _item(crit)
 
     def replace(self, **columns: Any) -> "Evaluated":
-        """Return the answers to the same cases with other values of some inputs, and one k."""
+        """Return the answers to the same cases with other values of some inputs, and with one k."""
         cases = self.cases._replace(columns={**self.columns, **columns}, ends=None)
         return Evaluated(self.tabulated, cases)
 
@@ -106,7 +108,7 @@ def _item(array: Array) -> float:
 
 
 def where(condition: Any, one: Any, other: Any) -> Any:
-    """Return ``np.where``, which takes a microsecond for a single number."""
+    """Return ``np.where``, but without its microsecond for a single number."""
     if isinstance(condition, np.ndarray):
         return np.where(condition, one, other)
     return one if condition else other

@@ -1,4 +1,4 @@
-"""Cases become their answer: the one place where outputs are computed."""
+"""Compute the answer to cases: the one place where outputs are computed."""
 
 import math
 from collections.abc import Iterable
@@ -19,9 +19,9 @@ from mumacro.outputs.evaluated import Evaluated
 from mumacro.outputs.gradient import GRADIENT
 from mumacro.outputs.tabulated import Tabulated
 
-# times of kinds, divided by that of one spring across at one k
+# times of contacts and directions, divided by that of one spring across with one k
 _COSTS = {"ball": 2.0, "along": 10.0, "normal": 10.0}
-_BALL_ALONG = 5.0  # a further factor: a ball along is a sum over springs
+_BALL_ALONG = 5.0  # a further factor, since a ball along is a sum over springs
 _INTERVAL = 200.0
 
 
@@ -29,8 +29,8 @@ _NO_NAMES = frozenset[str]()
 
 
 def names_in(include: Iterable[str] | str) -> list[str]:
-    """Return the names of outputs in a list, or in a text with commas; InputError for an unknown
-    one."""
+    """Return the names of outputs in a list, or in a text with commas.  Raise InputError for an
+    unknown name."""
     try:
         names = include.split(",") if isinstance(include, str) else [*include]
     except TypeError:
@@ -49,10 +49,11 @@ def _unknown(name: Any) -> InputError:
 def chosen(
     include: Iterable[str] | str, cases: Cases, gradient: bool = False
 ) -> tuple[Output, ...]:
-    """Return the outputs of these names, and ``gradient``, each once, in their order; with those of
-    deviations where the cases have some.
+    """Return the outputs of these names (with ``gradient`` if asked for), each once, in the fixed
+    order.  Add the outputs of deviations if the cases have deviations.
 
-    InputError for an unknown name, one that the cases lack, and std without a deviation.
+    Raise InputError for an unknown name, for an output that does not exist for the cases, and for
+    std without a deviation.
     """
     is_empty = type(include) is tuple and not include
     names = _NO_NAMES if is_empty else frozenset(names_in(include))
@@ -67,7 +68,7 @@ def chosen(
 def _chosen(
     names: frozenset[str], kind: Kind, deviations: bool, interval: bool
 ) -> tuple[Output, ...]:
-    """Return the same, by what of the cases it depends on."""
+    """Return the same from the properties of the cases on which it depends."""
     if "std" in names and not deviations:
         bound = "without std where no input has a deviation: give one, such as std_k"
         raise InputError("include", "std", bound)
@@ -83,7 +84,7 @@ def _chosen(
 
 
 def paths_of(outputs: Iterable[Output], fields: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the paths of all values of outputs, for cases with these inputs, in order."""
+    """Return the paths of all values of the outputs, for cases with these inputs, in order."""
     return _paths(tuple(output.name for output in outputs), fields)
 
 
@@ -93,8 +94,8 @@ def _paths(names: tuple[str, ...], fields: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def cost(outputs: Iterable[Output], cases: Cases) -> float:
-    """Return the time of one of the cases with these outputs, about, in times of mu_macro alone for
-    one spring across."""
+    """Return the approximate time of one of the cases with these outputs, relative to mu_macro
+    alone for one spring across."""
     ball = cases.kind.contact == BALL.contact
     costs = ((ball and output.cost_of_ball) or output.cost for output in outputs)
     over_interval = _INTERVAL if cases.ends is not None else 1.0
@@ -111,7 +112,7 @@ def _cost_of(kind: Kind) -> float:
 def evaluate_cases(
     tabulated: Tabulated, cases: Cases, outputs: tuple[Output, ...] = (), groups: bool = False
 ) -> Answer[Any]:
-    """Return the answer to cases with these outputs; ``groups`` keeps v~, y~ and l0, too."""
+    """Return the answer to cases with these outputs; ``groups`` adds v~, y~ and l0."""
     detail: Detail = "groups" if outputs or groups else "values"
     if outputs and any(output.gradient for output in outputs):
         detail = "gradient"
@@ -182,14 +183,14 @@ def _of_many(
     return answer
 
 
-# what stands beside the outputs, by the names of attributes
+# values that are not outputs, by the names of attributes
 _ALWAYS = ("mu_macro", "mu_ratio", "error_bound", "source")
 _SLOPES = ("gradient", "gradient_bound")
 
 
 def _columns(evaluated: Evaluated, outputs: tuple[Output, ...]) -> Values:
-    """Return all that is computed of cases in columns: outputs by path, and what stands beside them
-    by name; NaN where a case is not legal."""
+    """Return all computed columns of cases: outputs by path, the other values by name; NaN where a
+    case is illegal."""
     columns: Values = {}
     with np.errstate(all="ignore"):
         for output in outputs:

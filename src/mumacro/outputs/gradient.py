@@ -1,4 +1,4 @@
-"""The slopes of mu_macro."""
+"""Compute the derivatives of mu_macro."""
 
 import math
 from typing import Any
@@ -12,7 +12,7 @@ PER = {name: PER_UNIT["Fz" if name == AMPLITUDE else name] for name in ALL_FIELD
 
 
 def slopes_by_input(cases: Evaluated) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return d mu_macro / d input and the bounds by field; NaN along k where contact is rigid."""
+    """Return d mu_macro / d input and the bounds, by field; NaN along k if the contact is rigid."""
     no_slope = where(cases.rigid, math.nan, 0.0)
     slopes, bounds = cases.gradient, cases.gradient_bound
     return {**slopes, "k": slopes["k"] + no_slope}, {**bounds, "k": bounds["k"] + no_slope}

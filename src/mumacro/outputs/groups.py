@@ -1,4 +1,4 @@
-"""The dimensionless groups."""
+"""Compute the dimensionless speed and amplitude."""
 
 from mumacro.outputs.entry import Member, Output, Values
 from mumacro.outputs.evaluated import Evaluated

@@ -1,4 +1,4 @@
-"""Marks on the friction law of a case."""
+"""Compute the marks on the friction law of a case: its static limit and its border."""
 
 import math
 
@@ -8,10 +8,11 @@ from mumacro.outputs.evaluated import Evaluated, where
 
 
 def limits(cases: Evaluated) -> Values:
-    """Return mu_macro at rest; the speed at the border of continuous sliding, and mu_macro
-    there."""
+    """Return mu_macro at rest, the speed at the border of continuous sliding, and mu_macro there.
+    """
     omega = cases.columns["omega"]
-    if DIRECTIONS[cases.kind.direction] == "along":  # where the contact begins to slide backwards
+    # the speed below which the contact slides backwards during a part of the period
+    if DIRECTIONS[cases.kind.direction] == "along":
         speed = cases.columns["y0"] * omega
     else:  # rigid contact is the limit y~ -> inf: l0 omega v~crit = 0.477 omega sqrt(y0 l0) -> 0
         crit = cases.crit(where(cases.usable, cases.y_tilde, 0.0))

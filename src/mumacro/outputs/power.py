@@ -1,4 +1,4 @@
-"""The mean powers of the shaker and of the drive."""
+"""Compute the mean power of the shaker and of the drive."""
 
 import math
 from typing import Any
@@ -10,16 +10,16 @@ from mumacro.outputs.entry import Member, Output, Values
 from mumacro.outputs.evaluated import Evaluated, where
 from mumacro.table.atlas import ROUNDING
 
-_LEAST, _MOST = 1e-290, 1e290  # products between them have all their digits
+_LEAST, _MOST = 1e-290, 1e290  # products between these limits have all their digits
 _FAST = (
     1e100  # a v~ that stands for the limit of fast sliding, where p is v~ times a function of y~/v~
 )
-_DENORMAL = 1e-323  # two of the least numbers
+_DENORMAL = 1e-323  # two times the smallest double
 
 
 def power(cases: Evaluated) -> Values:
-    """Return mu0 Fz l0 omega <y~ cos tau u_y> of the shaker, (mu0 - mu_macro) Fz v0 saved by the
-    drive."""
+    """Return the power of the shaker, mu0 Fz l0 omega <y~ cos tau u_y>, and the power that the
+    drive saves, (mu0 - mu_macro) Fz v0."""
     mu0, load, omega, v0 = (cases.columns[name] for name in ("mu0", "Fz", "omega", "v0"))
     v, y = (where(cases.usable, group, 1.0) for group in (cases.v_tilde, cases.y_tilde))
     number, bound = cases.quantity("power", v, y)
@@ -29,7 +29,7 @@ def power(cases: Evaluated) -> Values:
     saved = (mu0 - cases.mu_macro) * load * v0
     saved_bound = cases.error_bound * load * v0 + ROUNDING * abs(saved)
     size: Any = abs(saved)
-    # of the drive; and of the shaker
+    # first the power of the drive, then that of the shaker
     driven = (mu0 > _LEAST) & ((cases.mu_macro == mu0) | (size > _LEAST)) & (size < _MOST)
     plain = driven & (v < math.inf)
     products: tuple[Any, ...] = mu0, force, cases.length_scale, rate, unit, shaker
@@ -47,8 +47,9 @@ def power(cases: Evaluated) -> Values:
 
 
 def _at_the_ends(cases: Evaluated, here: Any, *of_table: Any) -> tuple[Array, Array, Array, Array]:
-    """Return the same where a group or a product may leave the range of numbers though the result
-    does not: products as a whole; NaN where the power is 0 or does not exist."""
+    """Return the same powers where v~, y~ or a product may leave double range though the result
+    does not.  Products are computed as a whole.  The result is NaN where the power is 0 or does not
+    exist."""
     size = np.size(cases.mu_ratio)
     mu0, load, k, y0, omega, v0 = (np.broadcast_to(x, size)[here] for x in cases.columns.values())
     v, y, number, bound, ratio, error, elastic = (
@@ -67,17 +68,17 @@ def _at_the_ends(cases: Evaluated, here: Any, *of_table: Any) -> tuple[Array, Ar
             )
             for row, at_speed in zip((number, bound), sliding[:2], strict=True)
         )
-        # groups that underflow: p is below y~^2, and below v~
+        # if v~ or y~ underflow: p is below y~^2, and below v~
         value_bound += np.where((y == 0.0) & (y0 > 0.0), _product((k, y0, y0, omega)), 0.0)
         value_bound += np.where((v == 0.0) & (v0 > 0.0), _product((mu0, load, v0)), 0.0)
         value, value_bound = (
             np.where(elastic, x, math.nan) for x in (value, value_bound + _DENORMAL)
         )
         saved = _product((mu0, 1.0 - ratio, load, v0))
-        # of a ratio that is rounded to the next number below 1
+        # for a ratio that was rounded to the next number below 1
         rounding = _product((mu0, np.full(v.size, 2.0**-53), load, v0))
         saved_bound = _product((error, load, v0)) + ROUNDING * saved + rounding + _DENORMAL
-        # of mu_macro and its bound where they are subnormal
+        # for a subnormal mu_macro and its bound
         lost = _product((np.full(v.size, _DENORMAL), load, v0))
         saved_bound += np.where(mu0 < _LEAST, lost, 0.0)
         saved_bound = np.where((v0 == 0.0) & (saved == 0.0), 0.0, saved_bound)
@@ -85,7 +86,8 @@ def _at_the_ends(cases: Evaluated, here: Any, *of_table: Any) -> tuple[Array, Ar
 
 
 def _product(factors: tuple[Array, ...], divisors: tuple[Array, ...] = ()) -> Array:
-    """Return a product whose parts may leave the range of numbers, rounded to it at the end."""
+    """Return a product, rounded to double range at the end, though its parts may leave this range.
+    """
     mantissa, exponent = np.ones(factors[0].size), np.zeros(factors[0].size, np.int64)
     for x in factors:
         part, power_of_two = np.frexp(x)

@@ -1,4 +1,4 @@
-"""How long the contact sticks."""
+"""Compute how long the contact sticks."""
 
 import math
 
@@ -7,9 +7,9 @@ from mumacro.outputs.evaluated import Evaluated, where
 
 
 def stick_fraction(cases: Evaluated) -> Values:
-    """Return share of the period during which the contact sticks."""
+    """Return the fraction of the period during which the contact sticks."""
     value, bound = cases.quantity("stick_fraction", cases.v_tilde, cases.y_tilde)
-    # y~ below double range: the groups do not show whether such a contact sticks
+    # y~ below double range: v~ and y~ do not show whether such a contact sticks
     lost = (cases.y_tilde == 0.0) & (cases.v_tilde < math.inf) & cases.moving
     return {"stick_fraction": value, "stick_fraction_bound": where(lost, 1.0, bound)}
 

@@ -1,7 +1,8 @@
-"""The quantities of one table at points and at cases: all that asks the kernel for them.
+"""Evaluate the quantities of one table at points and for cases: everything that calls the kernel
+for them.
 
-Large arrays are cut into slices, on several threads where that helps
-(:mod:`mumacro.kernel.threads`).  Nothing here checks a value: what is illegal gives NaN and the
+Large arrays are cut into slices, on several threads if that is faster
+(:mod:`mumacro.kernel.threads`).  Nothing here checks a value: an illegal one gives NaN and the
 source code -1.
 """
 
@@ -25,36 +26,38 @@ from mumacro.table.blocks import BorderPiece, Table
 from mumacro.table.polynomials import Border, block_rows, outer_cells, quantity_cells
 
 _KERNEL = kernels[-1]
-#: for one point, which does not fill the widest registers; the bits are the same
+#: for one point, which does not fill the widest registers; the result has the same bits
 SCALAR_KERNEL: Final = kernels[min(1, len(kernels) - 1)]
 CODES = {name: code for code, name in enumerate(atlas.QUANTITY_NAMES)}
 
 
 class Tabulated:
-    """A table, its cells as the kernel reads them, and how many threads a call may use."""
+    """Hold a table, its cells as the kernel reads them, and the number of threads that a call may
+    use."""
 
     def __init__(self, table: Table, path: Path, threads: int | None) -> None:
         self.table = table
         self.threads = threads
         self.border = Border(table.border)
         _check_border(table.border, path)
-        #: by code of the contact, each with the cells of mu~ at least; cut on first use
+        #: by code of the contact, each with at least the cells of mu~; computed on first use
         self._across: dict[int, Data] = {}
         self._springs = self.data()
-        #: of one spring, with the cells of mu~
+        #: for one spring, with the cells of mu~
         self.pointer = self._springs.pointer
 
     def on_one_thread(self) -> Self:
-        """Return the same cells, whose calls start no thread."""
+        """Return the same table, but its calls start no thread."""
         other = copy.copy(self)
         other.threads = 1
         return other
 
     def data(self, name: str = "mu_ratio", kind: Kind = SPRING) -> Data:
-        """Return what the kernel reads of a quantity of a kind; its cells are cut on first use.
+        """Return the data that the kernel reads for a quantity, a contact and a direction.  Its
+        cells are computed on first use.
 
-        A table has cells of every contact that is shaken across; other directions are computed from
-        closed forms of one spring, of a ball by a quadrature over springs.
+        A table has cells for every contact that is shaken across.  Other directions come from
+        closed forms of one spring; for a ball from a quadrature over springs.
         """
         code = SPRING.contact if kind.direction else kind.contact
         data = self._across.get(code)
@@ -69,7 +72,7 @@ class Tabulated:
         return data
 
     def _cells_of(self, code: int) -> Data:
-        """Return a contact with the cells of mu~."""
+        """Return the data of a contact with the cells of mu~."""
         contact = self.table.contacts[CONTACTS[code]]
         data = Data(*self.border.arrays, block_rows(contact), outer_cells())
         data.add_quantity(atlas.MU, *quantity_cells(contact, atlas.MU))
@@ -95,7 +98,7 @@ class Tabulated:
         return SCALAR_KERNEL.value(self.data(name, kind), CODES[name], v, y, kind.contact)
 
     def slopes(self, name: str, v: Array, y: Array, kind: Kind = SPRING) -> SlopeRows:
-        """Return a quantity across at points (n,), with its slopes and their bounds."""
+        """Return a quantity across at points (n,), with its derivatives and their bounds."""
         return slices.slopes(CODES[name], self.data(name, kind), v, y, self.threads, kind.contact)
 
     def crit(self, y: Array, kind: Kind = SPRING) -> Array:
@@ -103,31 +106,32 @@ class Tabulated:
         return _KERNEL.border(self._springs, y, kind)
 
     def certain(self, v_tilde: Any, y_tilde: Any, kind: Kind = SPRING) -> Bools:
-        """Return whether v~ is further from v~crit than the error of v~crit and the rounding of v~
-        and y~ together, in the shape of both."""
+        """Return whether v~ differs from v~crit by more than the error of v~crit and the rounding
+        errors of v~ and y~ together, in the shape of both."""
         v, y = np.asarray(v_tilde), np.asarray(y_tilde)
         crit = self.crit(np.ravel(y).astype(np.float64), kind).reshape(y.shape)
         margin = self.border.max_rel_error + 4.0 * atlas.ROUNDING
         with np.errstate(all="ignore"):
-            # groups beyond double range are not near the border, or it cannot be decided
+            # beyond double range a point is not near the border, or it cannot be decided
             extreme = (y == 0.0) | ~np.isfinite(y) | ~np.isfinite(v) | (v == 0.0)
             return np.asarray(np.where(extreme, ~np.isnan(v), np.abs(v - crit) > margin * crit))
 
     # --- cases ------------------------------------------------------------------------------------
 
     def one(self, six: Sequence[Any], gradient: bool = False, contact: int = 0) -> Any:
-        """Return one case across in plain numbers: a ``mumacro_case``, see ``kernel/data.h``."""
+        """Return one case across as plain numbers: a ``mumacro_case``, see ``kernel/data.h``."""
         data = self._across.get(contact) or self.data(kind=Kind(contact, SPRING.direction))
         return SCALAR_KERNEL.one(data.pointer, six, gradient, contact)
 
     def rows(self, cases: Cases, detail: Detail = "values") -> CaseRows:
-        """Return answers to cases of one kind, in their shape, (1,) for one case."""
+        """Return the answers to cases of one contact and direction, in their shape, (1,) for one
+        case."""
         kind, shape = cases.kind, cases.shape or (1,)
         six = [*cases.columns.values()]
         return slices.cases(self.data(kind=kind), six, shape, self.threads, detail, kind)
 
     def extremes(self, cases: Cases) -> ExtremeRows:
-        """Return extremes of mu_macro over intervals of k, (n,) each."""
+        """Return the smallest and largest mu_macro over intervals of k, (n,) each."""
         if cases.ends is None:
             raise TypeError("the cases have one k each")
         low, high = cases.ends
@@ -137,8 +141,8 @@ class Tabulated:
 
 
 def _check_border(pieces: Sequence[BorderPiece], path: Path) -> None:
-    """Refuse a stored border whose nodes are not near the formula for every y~, since it selects
-    the block of a case."""
+    """Refuse a stored border whose nodes differ much from the formula for every y~, because the
+    border selects the block of a case."""
     for index, ((name, axis, _), piece) in enumerate(zip(atlas.BORDER_PIECES, pieces, strict=True)):
         y = axis.amplitude(piece.nodes)
         crit = piece.values * _KERNEL.border_scales(index, y)[0]

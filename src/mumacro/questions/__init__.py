@@ -1,1 +1,1 @@
-"""Questions to a surrogate: the friction law, and the inputs that give a friction."""
+"""Answer questions about a table: the friction law, and the inputs that give a wanted friction."""

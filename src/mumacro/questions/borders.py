@@ -1,4 +1,4 @@
-"""The borders that a sweep crosses: where continuous sliding, or along reverse slip, begins or
+"""Find the borders that a sweep crosses: where continuous sliding (along: reverse slip) begins or
 ends."""
 
 import math
@@ -26,8 +26,8 @@ BORDER_NAMES = {
 
 @dataclass(frozen=True)
 class Crossing:
-    """A value of the swept input at which the regime changes, mu_macro there, and the regimes below
-    and above."""
+    """Hold a value of the swept input at which the regime changes, mu_macro there, and the regimes
+    below and above."""
 
     value: float
     mu_macro: float
@@ -35,7 +35,7 @@ class Crossing:
 
     @property
     def name(self) -> str:
-        """Which border it is."""
+        """Return the name of the border."""
         regime = next(regime for regime in ("continuous", "reverse_slip") if regime in self.regimes)
         return BORDER_NAMES[regime]
 
@@ -51,21 +51,21 @@ def border_crossings(
     direction: str = "across",
     stiffening: Stiffening | None = None,
 ) -> tuple[Crossing, ...]:
-    """Return where in ``low <= along <= high`` continuous sliding or (along) reverse slip begins or
-    ends, ascending.
+    """Return the values in ``low <= along <= high`` where continuous sliding or (along) reverse
+    slip begins or ends, ascending.
 
-    ``case`` holds the other five inputs, of which k grows with Fz where there is a ``stiffening``.
-    Of continuous sliding none, one, or (across, over mu0, Fz or k) two places; none for rigid
-    contact (never any stick) and without oscillation.
+    ``case`` holds the other five inputs; with a ``stiffening``, k grows with Fz.  The border of
+    continuous sliding is crossed at most once, or twice (across, over mu0, Fz or k).  A rigid
+    contact never sticks, and without oscillation there is no border, so the list is empty.
     """
     kind = kind_of(contact, direction)
     curve = InputCurve(surrogate, fixed_inputs(case, along, kind), along, kind, stiffening)
     if curve.case.get("k") == math.inf or 0.0 in curve.case.values() or curve.proportional:
         return ()
-    low = max(low, TINY)  # at 0 nothing oscillates or slides
-    # On a ray v~/v~crit(y~) is smallest at STEEPEST_Y, where d ln v~crit / d ln y~ = 1.  The slope
-    # falls strictly from 2 to 1/2 (20,001 places from 1e-6 to 1e12), so the border is crossed at
-    # most once on either side.
+    low = max(low, TINY)  # at 0 there is no oscillation or no sliding
+    # On a ray v~/v~crit(y~) is smallest at STEEPEST_Y, where d ln v~crit / d ln y~ = 1.  The
+    # derivative falls strictly from 2 to 1/2 (20,001 samples from 1e-6 to 1e12), so each side of
+    # STEEPEST_Y crosses the border at most once.
     middle = low if along in EVERYWHERE or direction != "across" else curve.where(STEEPEST_Y)
     edges = np.array([low, middle, high] if low < middle < high else [low, high])
     pairs = []

@@ -1,4 +1,4 @@
-"""mu_macro as a curve over one input, the other five constant."""
+"""Evaluate mu_macro as a curve over one input, with the other five constant."""
 
 import math
 from collections.abc import Mapping
@@ -14,16 +14,16 @@ from mumacro.kernel.arrays import Array
 from mumacro.outputs.gradient import GRADIENT
 from mumacro.surrogate import Surrogate
 
-EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # inputs that are searched over all their values
-# of a refined curve: the error of a straight line over the height, the number of halvings
+EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # inputs that are searched over all legal values
+# for a refined curve: the error of a straight line relative to the height, the number of halvings
 _CHORD, _HALVINGS = 1e-3, 8
 
 
 class InputCurve:
-    """mu_macro as a function of one input, ``unknown``; ``case`` holds the other five, an infinite
-    ``k`` is rigid.
+    """Evaluate mu_macro as a function of one input, ``unknown``.  ``case`` holds the other five; an
+    infinite ``k`` is rigid.
 
-    With a ``stiffening`` the unknown is Fz, and ``k`` is that at one load and grows with Fz.
+    With a ``stiffening`` the unknown is Fz; then ``k`` holds at one load and grows with Fz.
     """
 
     costly = False
@@ -50,19 +50,19 @@ class InputCurve:
     ) -> Answer[Any]:
         """Return the surrogate's answers at values ``x`` (n,) of the input [SI].
 
-        ``replaced`` holds other values for inputs of the case.  A value out of bounds raises
-        InputError where ``strict``; otherwise its answer is NaN.
+        ``replaced`` has other values for inputs of the case.  For a value out of bounds the answer
+        is NaN, or, if ``strict``, InputError is raised.
         """
         cases = self.cases(x, strict, **replaced)
         return self.surrogate.answer(cases, (GRADIENT,) if gradient else (), groups)
 
     def cases(self, x: Any, strict: bool, **replaced: Any) -> Cases:
-        """Return the cases that :meth:`answer` evaluates; ``replaced`` may hold deviations, too."""
+        """Return the cases that :meth:`answer` evaluates; ``replaced`` may also have deviations."""
         k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
         return Cases.of({**self.case, **k, self.unknown: x, **replaced}, self.kind, strict)
 
     def groups(self, x: float) -> tuple[float, float]:
-        """Return v~ and y~ at one value of the input, from the inputs alone."""
+        """Return v~ and y~ at one value of the input, computed from the inputs alone."""
         c = self.cases(x, True).columns
         swing = c[AMPLITUDE] / c["Fz"] if self.kind.normal else None
         with np.errstate(all="ignore"):
@@ -75,12 +75,13 @@ class InputCurve:
         return np.asarray(self.answer(x).mu_macro)
 
     def evaluate(self, x: Array) -> tuple[Array, Array]:
-        """Return mu_macro [-] at ``x`` and the bound of its error, each in the shape of ``x``."""
+        """Return mu_macro [-] at ``x`` and its error bound, in the shape of ``x``."""
         answer = self.answer(x)
         return np.asarray(answer.mu_macro), np.asarray(answer.error_bound)
 
     def refined(self, values: Array) -> Array:
-        """Return ``values`` and more between them, where chords of mu_macro differ from it."""
+        """Return ``values``, and more values where straight lines between them would be far from
+        mu_macro."""
         mu = self.mu(values)
         for _ in range(_HALVINGS):
             low, high = values[:-1], values[1:]
@@ -97,8 +98,8 @@ class InputCurve:
         return values
 
     def where(self, group: float) -> float:
-        """Return value of k, Fz or mu0 at which y~, for normal v~/z, is ``group``, within double
-        range; any value for a rigid contact."""
+        """Return the value of k, Fz or mu0 at which y~ (for normal: v~/z) is ``group``, within
+        double range.  For a rigid contact return any value."""
         reference = self.answer(1.0 if self.stiffening is None else self.stiffening.load)
         reference_group = float(
             reference.v_tilde / reference.y_tilde if self.kind.normal else reference.y_tilde
@@ -110,6 +111,6 @@ class InputCurve:
 
     @property
     def proportional(self) -> bool:
-        """Whether k grows in proportion to Fz, so that Fz has no influence."""
+        """Return whether k is proportional to Fz, so that Fz has no influence."""
         growth = self.stiffening
         return growth is not None and growth.exponent == 1.0 and not self.kind.normal

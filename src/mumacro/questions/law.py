@@ -1,4 +1,5 @@
-"""The friction law: mu_macro over a range of v0, or of any one input, with its marks."""
+"""Compute the friction law: mu_macro over a range of v0, or of any other input, with its static
+limit and borders."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -41,36 +42,36 @@ SCALES = ("log", "linear")
 
 @dataclass(frozen=True, repr=False)
 class Law(Result):
-    """A sweep of one input."""
+    """Hold a sweep of one input."""
 
-    along: str  #: the swept input, as it was named: omega [rad/s] or f [Hz]
+    along: str  #: the swept input as the caller named it: omega [rad/s] or f [Hz]
     values: Array  #: its values [SI], ascending, shape (n,)
-    #: the results, arrays (n,); of an interval of k those at its geometric middle, and the band; of
-    #: inputs with a deviation that of mu_macro, too
+    #: the results, arrays (n,).  With an interval of k: the results at its geometric middle, and
+    #: the band.  With deviations of inputs: also the deviation of mu_macro
     answer: Answer[Any]
-    cases: Cases  #: what they are the results of: the inputs at each value, with what is uncertain
-    #: static limit (v0 -> 0) of each case [-], of one spring across eq. (38), shape (n,)
+    cases: Cases  #: the inputs at each value, with their deviations or intervals
+    #: static limit (v0 -> 0) of each case [-], for one spring across eq. (38), shape (n,)
     mu_static: Array
-    #: where in the range continuous sliding, or along reverse slip, begins or ends
+    #: the values in the range where continuous sliding (along: reverse slip) begins or ends
     border: tuple[Crossing, ...]
-    case: dict[str, float]  #: the other five inputs [SI], checked; an interval of k by its middle
+    case: dict[str, float]  #: the other five inputs [SI], checked; k is the middle of its interval
     kind: Kind = SPRING  #: contact and direction; ``kind.names`` has them in words
     #: how k grows along Fz; None where k is constant
     stiffening: Stiffening | None = None
-    k_ends: tuple[float, float] | None = None  #: of the interval of k [N/m]; None for one number
+    k_ends: tuple[float, float] | None = None  #: ends of the interval of k [N/m]; None for one k
 
     @property
     def inputs(self) -> dict[str, Any]:
-        """All six inputs [SI]: ``case``, and the swept one (n,), omega where it is f; k (n,), too,
-        where it grows with Fz."""
+        """Return all six inputs [SI]: ``case``, and the swept input (n,); omega if the swept input
+        is f.  If k grows with Fz, it is an array (n,), too."""
         name, per = field_of(self.along)
         six = {**self.case, name: per * self.values}
         return six if self.stiffening is None else six | self.stiffening.scaled(six, self.values)
 
     @property
     def band(self) -> tuple[Array, Array] | None:
-        """Smallest and largest mu_macro over an interval of k [-], or mu_macro less and plus its
-        standard deviation, (n,) each; None where no input is uncertain."""
+        """Return the smallest and the largest mu_macro over an interval of k [-], or mu_macro minus
+        and plus its standard deviation, (n,) each.  Return None if no input is uncertain."""
         low, high = (getattr(self.answer, name, None) for name in BAND)
         if low is not None and high is not None:
             return low, high
@@ -80,13 +81,14 @@ class Law(Result):
 
     @property
     def std(self) -> Array | None:
-        """Standard deviation of mu_macro at each value [-], (n,); None where no input has one."""
+        """Return the standard deviation of mu_macro at each value [-], (n,), or None if no input
+        has one."""
         outputs = self.answer.outputs
         return np.asarray(outputs["std"]) if "std" in outputs else None
 
     @property
     def columns(self) -> dict[str, Any]:
-        """The law as a table: column -> values (n,), the swept input first."""
+        """Return the law as a table: column -> values (n,), the swept input first."""
         uncertain = ("std",) if self.std is not None else BAND if self.band else ()
         names = ["mu_macro", *uncertain, "regime", "error_bound", "source"]
         answer_columns = {name: self.answer[name] for name in names}
@@ -107,12 +109,12 @@ class Law(Result):
 
     @property
     def digits(self) -> int:
-        """The digits that k supports, at the middle value."""
+        """Return the number of digits that the uncertainty of k supports, at the middle value."""
         return digits(effect_of(self.answer, place=self.values.size // 2))
 
     @property
     def notes(self) -> list[Note]:
-        """On k, where Fz is swept."""
+        """Return the notes about k, if Fz is swept."""
         return load_notes(self.along, self.case, self.kind.names["contact"], self.stiffening)
 
     def _below(self) -> list[str]:
@@ -123,10 +125,10 @@ class Law(Result):
     def plot(
         self, ax: Any = None, *, roots_of: Mapping[float, Iterable[float]] = MappingProxyType({})
     ) -> Any:
-        """Draw mu_macro over the swept input with its static limit and borders; ``roots_of`` has
-        the roots of each target to mark.
+        """Draw mu_macro over the swept input with its static limit and borders.  ``roots_of`` maps
+        each target to the roots that are marked.
 
-        ``ax`` are axes of matplotlib, or new ones; they are returned.
+        ``ax`` are matplotlib axes, or None for new ones.  They are returned.
         """
         return plotting.plot_law(
             self.along,
@@ -146,11 +148,11 @@ class Law(Result):
 
 
 def sweep_values(along: str, start: float, stop: float, points: int, scale: str) -> Array:
-    """Return ``points`` values from ``start`` to ``stop``, both included exactly, even on a
-    ``scale`` "log" or "linear".
+    """Return ``points`` values from ``start`` to ``stop``, including both ends exactly, evenly
+    spaced on a ``scale`` "log" or "linear".
 
-    InputError for ends out of bounds or not ascending, a logarithmic range from 0, fewer than two
-    points.
+    Raise InputError if the ends are out of bounds or not ascending, if a logarithmic range begins
+    at 0, or if there are fewer than two points.
     """
     if along not in (*NAMES, AMPLITUDE):
         raise InputError("along", along, f"one of {', '.join(NAMES)}, {AMPLITUDE}")
@@ -167,7 +169,7 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
         raise InputError("stop", stop, "finite and > start")
     if scale == "linear":
         return np.linspace(start, stop, points)
-    # decades are exact
+    # powers of ten are exact
     values: Array = np.power(10.0, np.linspace(math.log10(start), math.log10(stop), points))
     values[0], values[-1] = start, stop
     return np.clip(values, start, stop)
@@ -181,7 +183,7 @@ def _end(along: str, name: str, value: Any) -> float:
 
 
 def _ascending(along: str, values: Any) -> Array:
-    """Return values of the swept input, (n,)."""
+    """Return the values of the swept input, (n,), after a check that they ascend."""
     x = np.asarray(to_si("values", values, QUANTITY_OF[along]))
     if x.ndim != 1 or not x.size or not np.all(np.diff(x) >= 0.0):
         raise InputError("values", values, "one-dimensional and ascending")
@@ -189,8 +191,7 @@ def _ascending(along: str, values: Any) -> Array:
 
 
 def _apart(case: Mapping[str, Any], swept: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the exact inputs of a case, and the deviations of those that have one, std_k and so
-    on."""
+    """Return the exact inputs of a case, and apart from them the deviations (std_k and so on)."""
     inputs = named(None, {name: x for name, x in case.items() if x is not None or name == "k"})
     deviations = {name: inputs.pop(name) for name in DEVIATIONS if name in inputs}
     for name in inputs.keys() & QUANTITY_OF.keys():
@@ -231,36 +232,36 @@ def law(
     ----------
     surrogate : Surrogate
     along : str
-        The swept input: mu0, Fz, k, y0, omega, f or v0; for direction normal Fz_amplitude in place
+        The swept input: mu0, Fz, k, y0, omega, f or v0; for direction normal Fz_amplitude instead
         of y0.
     start, stop : float
         Its first and its last value [SI], or with a unit as in "1mm/s"; both included.
     points, scale : int, str
-        How many values there are, evenly spaced on a scale "log" or "linear".
+        The number of values, evenly spaced on a scale "log" or "linear".
     values : array_like
-        The values themselves [SI], ascending, shape (n,), in place of ``start`` and ``stop``.
+        The values themselves [SI], ascending, shape (n,), instead of ``start`` and ``stop``.
     refine : bool
-        Also values where mu_macro bends, for pictures: at the borders, and where a straight line
-        between neighbours would be wrong by more than a thousandth of the law's height.
+        Whether to add values where mu_macro bends, for pictures: at the borders, and where a
+        straight line between neighbours would be wrong by more than 0.1 % of the law's height.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
     stiffness_exponent : float, optional
-        Along Fz only, m in k = k_given (Fz/Fz_given)^m, from 0 to 1.  Fz_given, the load at which
-        ``k`` holds, is ``Fz`` of the case.  Left out: 1/3 for a ball whose case has ``Fz``, else 0,
-        a constant k, and the case has no ``Fz``.
+        Along Fz only: m in k = k_given (Fz/Fz_given)^m, from 0 to 1.  Fz_given, the load at which
+        ``k`` holds, is ``Fz`` of the case.  Default: 1/3 for a ball whose case has ``Fz``,
+        otherwise 0, a constant k; then the case has no ``Fz``.
     **case : float
-        The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
-        for ``omega``; ``k_low`` and ``k_high`` for ``k``: the law has a band, see
-        :attr:`mumacro.questions.law.Law.band`.  So it has where inputs have a standard deviation:
-        "1 ± 0.1 N/um", or ``std_k`` and so on; where k grows with Fz, its deviation grows alike.
+        The other five inputs [SI].  ``k`` "rigid" or infinite is a rigid contact.  ``f`` [Hz] may
+        replace ``omega``; ``k_low`` and ``k_high`` may replace ``k``: then the law has a band, see
+        :attr:`mumacro.questions.law.Law.band`.  It also has a band if inputs have a standard
+        deviation: "1 ± 0.1 N/um", or ``std_k`` and so on; the deviation of a k that grows with Fz
+        grows in the same way.
 
     Raises
     ------
     InputError
-        An input that is missing, out of bounds, or given twice; an interval of k where k is swept,
-        a deviation of the swept input;
-        a range out of bounds; an exponent without the load at which k holds, or along another input
-        than Fz.
+        If an input is missing, out of bounds, or given twice; if k is swept and has an interval; if
+        the swept input has a deviation; if the range is out of bounds; if an exponent is given
+        without the load at which k holds, or along another input than Fz.
 
     Examples
     --------
@@ -297,7 +298,7 @@ def law(
     if ends:
         interval = {**{name: value for name, value in inputs.items() if name != "k"}, **ends}
         whole = InputCurve(surrogate, interval, name, kind, stiffening)
-    if stiffening is not None and "std_k" in deviations:  # it grows as k does
+    if stiffening is not None and "std_k" in deviations:  # it grows in the same way as k
         relative = read_one("std_k", deviations["std_k"]) / inputs["k"]
         deviations["std_k"] = stiffening.stiffness(inputs["k"], x) * relative
     cases = whole.cases(x, True, **deviations)

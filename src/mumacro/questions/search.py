@@ -1,14 +1,14 @@
-"""The one search for roots: where a function over one unknown reaches its targets.
+"""Search for roots: where a function of one unknown reaches its targets.
 
-The function has at every place a value and an estimate of its error.  It is sampled, and sampled
-again between, until no target can be crossed unseen.  Its turning points part it into branches, on
-which it rises or falls by more than its error; on a branch two samples bracket a target.  Bisection
-on the bits of a double then finds the first place that reaches it, and how far around this place
-the function is the target within its error.
+At every place the function has a value and an estimate of its error.  The search samples it, and
+adds samples until no target can be crossed unnoticed.  The turning points divide the function into
+branches, on which it rises or falls by more than its error.  On a branch two samples bracket a
+target.  A bisection over the bits of a double then finds the first place that reaches the target,
+and the range around it in which the function equals the target within its error.
 
-Where a call of the function takes long (a motion), the bisection runs over cubics through the
-samples instead, and the function is called at the roots of the cubics until it agrees with them.
-All targets share the samples.
+If one call of the function takes long (a motion), the bisection uses cubics through the samples.
+The function is then called at the roots of the cubics until it agrees with them.  All targets share
+the samples.
 """
 
 import itertools
@@ -22,21 +22,23 @@ from numpy.typing import ArrayLike, NDArray
 from mumacro.kernel.arrays import Array, Bools, Places
 
 TINY = 5e-324
-LEVELS = 7  # how often an interval between samples is halved
-# An interval is not searched if the targets are away by this many times the difference between a
-# sample and the cubic through its neighbours.  Found with 1,000 random problems
+LEVELS = 7  # number of times that an interval between samples is halved
+# An interval is not searched if all targets are further away than this many times the difference
+# between a sample and the cubic through its neighbours.  Found with 1,000 random problems
 # (benchmarks/solve_motion.py): with 1 a root was missed.
 _CLEAR = 4.0
-_ROUNDING = 2.0**-50  # of a target: a value is exact to rounding only, even without an error
-_ENOUGH = 0.1  # of its error is what the function may be off a target where cubics are used
-_NARROW = 1e-12  # relative width in which a bracket of a costly function counts as one place
-# A step between neighbours by more than this share of the whole span is a jump and no root; that of
-# a cusp, such as that of the static limit at y~ = 1, is the square root of rounding.
+_ROUNDING = 2.0**-50  # relative to a target: the rounding error of a value whose error is 0
+# where cubics are used, the function may differ from a target by this fraction of its error
+_ENOUGH = 0.1
+_NARROW = 1e-12  # a bracket of a costly function with a smaller relative width is one place
+# If the function steps between neighbouring doubles by more than this fraction of its whole range,
+# it is a jump and not a root. (At a cusp, such as that of the static limit at y~ = 1, the step is
+# only the square root of the rounding error.)
 _JUMP = 1e-6
 _MOST_STEPS = 80
-_SHARPENINGS, _INNER = 12, 8  # how often a turning point is narrowed, and places each time
-_SAFE = 16  # steps of a bracket after which every other one halves it
-_NEAR = 2.0**61  # doubles in a bracket, above which it is halved
+_SHARPENINGS, _INNER = 12, 8  # rounds in which a turning point is narrowed, and samples in each
+_SAFE = 16  # after this many steps on a bracket every second step halves it
+_NEAR = 2.0**61  # a bracket with more doubles in it is halved
 
 Function = Callable[[Array], tuple[Array, Array]]
 
@@ -48,31 +50,31 @@ class Curve(Protocol):
     costly: bool
 
     def evaluate(self, x: Array) -> tuple[Array, Array]:
-        """Return the values at ``x`` and the estimates of their errors, each in the shape of ``x``;
-        NaN where the function has none."""
+        """Return the values at ``x`` and the estimates of their errors, in the shape of ``x``; NaN
+        where the function has no value."""
         ...
 
 
 class Found(NamedTuple):
-    """One place that reaches a target."""
+    """Hold a place that reaches a target."""
 
-    value: float  #: the first place that reaches it
-    #: between them the function is the target within its error
+    value: float  #: the first place that reaches the target
+    #: between them the function equals the target within its error
     low: float
     high: float
-    mean: float  #: the function at ``value``
-    error: float  #: of it
+    mean: float  #: value of the function at ``value``
+    error: float  #: its error
 
 
 class Samples:
-    """Values of a curve and their errors at ascending places."""
+    """Hold values of a curve and their errors at ascending places."""
 
     def __init__(self, curve: Curve) -> None:
         self.curve = curve
         self.x, self.value, self.error = np.empty(0), np.empty(0), np.empty(0)
 
     def add(self, places: Array) -> None:
-        """Sample the curve at new places; leave out those where it has no value."""
+        """Sample the curve at new places; drop a place where it has no value."""
         x = np.setdiff1d(places, self.x)
         if not x.size:
             return
@@ -111,7 +113,7 @@ class Samples:
 
 
 class Search:
-    """Every root of every target in a range."""
+    """Find every root of every target in a range."""
 
     def __init__(
         self, curve: Curve, places: Array, low: float, high: float, targets: Array
@@ -122,8 +124,8 @@ class Search:
         self.samples.add(places)
 
     def roots(self) -> list[list[Found]]:
-        """Return the roots of each target, ascending: a range of roots, and roots whose ranges
-        overlap, are one."""
+        """Return the roots of each target, ascending.  A range of roots counts as one root, and so
+        do roots whose ranges overlap."""
         self._refine()
         self._sharpen()
         which, places = self._first_places()
@@ -154,27 +156,28 @@ class Search:
 
     @property
     def extremes(self) -> tuple[float, float]:
-        """The smallest and the largest value in the range."""
+        """Return the smallest and the largest value in the range."""
         ends = self.samples.value[self._edges()]
         return float(ends.min()), float(ends.max())
 
     @property
     def constant(self) -> bool:
-        """Whether the function is one value within its error."""
+        """Return whether the function is constant within its error."""
         value, error = self.samples.value, self.samples.error
         return bool(np.max(value - error) <= np.min(value + error))
 
     # --- samples ----------------------------------------------------------------------------------
 
     def _hold(self, low: Array, high: Array) -> Bools:
-        """Return which of the ranges of values hold a target."""
+        """Return which ranges of values contain a target."""
         first = np.searchsorted(self._sorted, low, side="left")
         return np.asarray(np.searchsorted(self._sorted, high, side="right") > first)
 
     def _refine(self) -> None:
-        """Halve the intervals between samples until every part of the curve is decided."""
+        """Halve the intervals between samples until it is decided for each whether it crosses a
+        target."""
         samples = self.samples
-        starts = samples.x[:-1]  # of the intervals that are open
+        starts = samples.x[:-1]  # first samples of the open intervals
         for _ in range(LEVELS):
             i = np.searchsorted(samples.x, starts)
             middles = _middle(samples.x[i], samples.x[i + 1])
@@ -191,27 +194,27 @@ class Search:
             starts = np.concatenate((starts[still], middles[still]))
 
     def _undecided(self, j: Places, off: Array) -> Bools:
-        """Return around which of the new samples ``j`` a target may be crossed unseen, where the
-        cubic was ``off``."""
+        """Return which intervals next to the new samples ``j`` may cross a target unnoticed;
+        ``off`` is the difference between the cubic and the new samples."""
         value, error = self.samples.value, self.samples.error
         a, middle, b = value[j - 1], value[j], value[j + 1]
         away = np.where(np.isnan(off), np.inf, _CLEAR * off + error[j])
         near = np.any([self._hold(v - away, v + away) for v in (a, middle, b)], axis=0)
-        # a target is the value within its error: halves tell no more, they are one root
+        # if the whole interval equals the target within its error, it is one root; do not halve it
         triples = [(value[j + n], error[j + n]) for n in (-1, 0, 1)]
         least, most = (
             pick([v + side * e for v, e in triples], axis=0)
             for pick, side in ((np.max, -1.0), (np.min, 1.0))
         )
         flat = (least <= most) & self._hold(least, most)
-        # an interval that crosses a target is open until the curve in it is smooth
+        # an interval that crosses a target stays open until the curve in it is smooth
         crossing = self._hold(np.minimum(a, b), np.maximum(a, b))
         smooth = off <= 1e-3 * np.abs(b - a) + error[j]
         monotone = (middle - a) * (b - middle) >= 0.0
         return np.asarray(near & ~flat & ~(crossing & smooth & monotone))
 
     def _sharpen(self) -> None:
-        """Sample the curve around its turning points, until targets and extremes are decided."""
+        """Add samples around the turning points, until targets and extremes are decided."""
         samples = self.samples
         turns = [
             (samples.x[i - 1], samples.x[i + 1], side)
@@ -235,7 +238,7 @@ class Search:
     # --- roots ------------------------------------------------------------------------------------
 
     def _first_places(self) -> tuple[Places, Array]:
-        """Return targets, by their index, and where a branch first reaches them."""
+        """Return the indices of targets, and the places where a branch first reaches them."""
         samples = self.samples
         for step in range(_MOST_STEPS):
             (at_ends, ends), (which, i, sign) = self._brackets()
@@ -244,7 +247,8 @@ class Search:
                 before, places = _first(self.curve.evaluate, a, b, level, sign)
                 value, error = self.curve.evaluate(np.stack((before, places)))
                 off = np.abs(value - level) - _allowed(error, level)
-                # a step may leave the target within the error of its other side alone
+                # after a jump the value may equal the target only because of the error before the
+                # jump
                 places = np.where((off[0] <= 0.0) & (off[1] > 0.0), before, places)
                 break
             off = np.abs(samples.value[[i - 1, i]] - level) - _ENOUGH * samples.error[[i - 1, i]]
@@ -265,13 +269,14 @@ class Search:
         return [0, *turns, samples.x.size - 1]
 
     def _brackets(self) -> tuple[tuple[Places, Array], tuple[Places, Places, Array]]:
-        """Return targets with the ends of branches that are the target within their error, and
-        targets with the samples that first reach them and whether the branch rises, 1, or falls."""
+        """Return two groups of brackets.  In the first, the end of a branch equals the target
+        within its error: targets and ends.  In the second, the branch crosses the target: targets,
+        the samples that first reach them, and 1 if the branch rises or -1 if it falls."""
         x, value, error = self.samples.x, self.samples.value, self.samples.error
         at_ends, ends, crossed, firsts, signs = [], [], [], [], []
         for first, last in pairwise(self._edges()):
             sign = 1.0 if value[last] >= value[first] else -1.0
-            # rounding may make a plateau fall by a digit; a root is where its level is reached
+            # rounding may make a plateau fall by a digit; a root is where the target is reached
             risen = np.maximum.accumulate(sign * value[first : last + 1])
             j = np.searchsorted(risen, sign * self.targets)
             inside = np.flatnonzero((j > 0) & (j < risen.size))
@@ -287,8 +292,8 @@ class Search:
         return (every[0], every[1]), (every[2], every[3], every[4])
 
     def _widths(self, function: Function, which: Places, places: Array) -> tuple[Array, Array]:
-        """Return how far below and above places, the roots of the targets ``which``, the function
-        is the target within its error."""
+        """Return how far the range in which the function equals the target within its error extends
+        below and above each root.  ``which`` is the target of each of ``places``."""
         samples, targets = self.samples, self.targets[which]
         x = samples.x
 
@@ -296,7 +301,7 @@ class Search:
             away = np.abs(samples.value[i] - target)
             return np.asarray(away > _allowed(samples.error[i], target))
 
-        # the nearest samples that are not the target: nearly always the next ones
+        # the nearest samples that differ from the target: nearly always the next ones
         below = np.searchsorted(x, places) - 1
         above = np.searchsorted(x, places, side="right")
         above[above == x.size] = -1
@@ -313,14 +318,15 @@ class Search:
             target = targets[rows]
             return np.asarray(np.abs(value - target) - _allowed(error, target))
 
-        on_cusp = excess(places, np.arange(places.size)) > 0.0  # the next double is off, too
+        on_cusp = excess(places, np.arange(places.size)) > 0.0  # the next double differs, too
         low[on_cusp] = high[on_cusp] = places[on_cusp]
         i, j = np.flatnonzero((below >= 0) & ~on_cusp), np.flatnonzero((above >= 0) & ~on_cusp)
         roots, upward = np.r_[i, j], np.repeat([False, True], [i.size, j.size])
 
         def height(q: Array, rows: Places) -> Array:
             off = excess(q, roots[rows])
-            return np.where(upward[rows], off - TINY, -off)  # upward 0 still is the target
+            # at upward 0 it still equals the target
+            return np.where(upward[rows], off - TINY, -off)
 
         first, last = np.r_[x[below[i]], places[j]], np.r_[places[i], x[above[j]]]
         before, after = last_double(height, first, last)
@@ -329,15 +335,15 @@ class Search:
 
 
 def _allowed(error: Array, target: Array) -> Array:
-    """Return by how much a value may differ from a target that it is within its error."""
+    """Return by how much a value may differ from a target that it equals within its error."""
     return np.maximum(error, _ROUNDING * np.abs(target))
 
 
 def _first(
     function: Function, a: Array, b: Array, level: Array, sign: Array
 ) -> tuple[Array, Array]:
-    """Return the last doubles from ``a`` on before levels are reached, and the first at which they
-    are, (n,)."""
+    """Return for each level, from ``a`` on, the last double before it is reached and the first one
+    at which it is reached, (n,)."""
 
     def height(q: Array, rows: Places) -> Array:
         return sign[rows] * (function(q)[0] - level[rows])
@@ -346,15 +352,15 @@ def _first(
 
 
 def _middle(a: Array, b: Array) -> Array:
-    """Return middles of intervals, in logarithms where these are far from 0."""
+    """Return the middles of intervals; the middle in logarithms if the interval is far from 0."""
     far = (a > 0.0) & (b > 1.5 * a)
     root = np.sqrt(np.where(far, a, 1.0)) * np.sqrt(np.where(far, b, 1.0))
     return np.where(far, root, 0.5 * a + 0.5 * b)
 
 
 def turning_points(value: Array, error: Array) -> list[tuple[int, float]]:
-    """Return the samples at which values turn by more than their error: 1 at a maximum, -1 at a
-    minimum.
+    """Return the samples at which values turn by more than their error, with 1 for a maximum and -1
+    for a minimum.
 
     >>> turning_points(np.array([0.0, 2.0, 1.9, 3.0, 0.0, 1.0]), np.full(6, 0.2))
     [(3, 1.0), (4, -1.0)]
@@ -363,7 +369,7 @@ def turning_points(value: Array, error: Array) -> list[tuple[int, float]]:
     side = np.sign(np.diff(value)[step])
     bends = step[1:][side[1:] != side[:-1]]
     turns: list[tuple[int, float]] = []
-    best, way = 0, 0.0  # the furthest sample since the last turn, and the direction since
+    best, way = 0, 0.0  # the furthest sample since the last turn, and the direction since then
     values, errors = value.tolist(), error.tolist()
     lowest = highest = 0
     for i in [*bends.tolist(), value.size - 1]:
@@ -388,7 +394,7 @@ def turning_points(value: Array, error: Array) -> list[tuple[int, float]]:
 
 
 def samples(low: float, high: float, per_decade: int, most: int = 20_001) -> Array:
-    """Return values > 0 from ``low`` to ``high``, evenly spread over the logarithm."""
+    """Return values > 0 from ``low`` to ``high``, evenly spaced in the logarithm."""
     first = max(low, TINY)
     start, stop = np.log(first), np.log(high)
     count = min(max(int((stop - start) / np.log(10.0) * per_decade), 64) + 1, most)
@@ -400,27 +406,29 @@ _SIGN = np.uint64(1 << 63)
 
 
 def _key_of(x: ArrayLike) -> NDArray[np.uint64]:
-    """Return whole numbers in the order of the doubles."""
+    """Return integers that have the same order as the doubles."""
     bits = (np.array(x, dtype=np.float64) + 0.0).view(np.uint64)  # + 0.0: -0.0 is 0.0
     return np.where(bits & _SIGN, ~bits, bits | _SIGN)
 
 
 def _double_of(key: NDArray[np.uint64]) -> Array:
-    """Return the doubles of keys."""
+    """Return the doubles that belong to the integers."""
     return np.where(key & _SIGN, key ^ _SIGN, ~key).view(np.float64)
 
 
 def last_double(
     height: Callable[[Array, Places], Array], low: ArrayLike, high: ArrayLike
 ) -> tuple[Array, Array]:
-    """Return neighbouring doubles (a, b), (n,): the last with a height below 0, the first without.
+    """Return neighbouring doubles (a, b), (n,): the last one with a height below 0, and the first
+    one with a height >= 0.
 
-    ``height`` maps values (m,) in the brackets (m,), counted from 0, to heights (m,); from below 0
-    at ``low`` (n,) it changes its sign once up to ``high``.
+    ``height`` takes values (m,) and the indices (m,) of their brackets, and returns heights (m,).
+    Each height is below 0 at ``low`` (n,) and changes its sign once up to ``high``.
 
-    Doubles are ordered like whole numbers, their *bits*, so this ends at two neighbours, whatever
-    the scale.  A bracket is cut where the inverse of a parabola through its ends and the last end
-    that it has left is 0, if that is safe (Chandrupatla's method), and halved otherwise.
+    Doubles have the order of integers, their *bits*, so the search ends at two neighbours on any
+    scale.  A bracket is cut at the root of an inverse parabola (Chandrupatla's method) if that is
+    safe, and halved otherwise.  The parabola passes through both ends and the end that was replaced
+    last.
     """
     newest, other = np.atleast_1d(_key_of(low)), np.atleast_1d(_key_of(high))
     i, one = np.arange(newest.size), np.uint64(1)
@@ -456,8 +464,9 @@ def _share(
     g: Array,
     h: Array,
 ) -> Array:
-    """Return where to cut brackets from the newest end ``a`` to ``b``, as a share of the way; ``c``
-    is the end that was left, ``f``, ``g`` and ``h`` are the heights, all (n,)."""
+    """Return where to cut brackets between the newest end ``a`` and ``b``, as a fraction of the
+    distance.  ``c`` is the end that was replaced; ``f``, ``g`` and ``h`` are the heights, all (n,).
+    """
     with np.errstate(all="ignore"):
         to_b, c_to_b = ((b - x).view(np.int64).astype(np.float64) for x in (a, c))
         xi, phi = to_b / c_to_b, (f - g) / (h - g)

@@ -1,4 +1,5 @@
-"""What an inverse problem gives: the roots of every target, and which targets are reachable."""
+"""Hold the solution of an inverse problem: the roots of every target, and which targets are
+reachable."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -9,20 +10,20 @@ from mumacro.errors import InputError
 from mumacro.inputs.units import unit_of
 from mumacro.results import Result, Rows
 
-NO_LIMIT = 1e300  # of the unknown: what is beyond it is all that a double holds
-_WIDE = 0.1  # of a root that is said in words: how wide it is, relative to its value
-_DEGREES = 100.0  # of a phase in place of its value
+NO_LIMIT = 1e300  # limit of the unknown; beyond it is the end of double range
+_WIDE = 0.1  # relative width from which a root is described as a range
+_DEGREES = 100.0  # width of a root of a phase from which it is described as a range
 
 
 @dataclass(frozen=True)
 class Reach:
-    """Which means of the friction are reachable in a range of the unknown."""
+    """Tell which means of the friction are reachable in a range of the unknown."""
 
-    low: float  #: the range of the unknown [SI], of a phase in degrees
+    low: float  #: the range of the unknown [SI]; a phase in degrees
     high: float
-    mu_min: float  #: smallest and largest mean in it [-]
+    mu_min: float  #: smallest and largest mean in this range [-]
     mu_max: float
-    min_included: bool = True  #: False where that value is approached and never reached
+    min_included: bool = True  #: False if the value is approached but never reached
     max_included: bool = True
 
     def holds(self, target: float) -> bool:
@@ -30,14 +31,15 @@ class Reach:
         return self.mu_min <= target <= self.mu_max and not self.only_approaches(target)
 
     def only_approaches(self, target: float) -> bool:
-        """Return whether ``target`` is an end, or beyond it, that is never reached."""
+        """Return whether ``target`` is at an end that is approached but never reached, or beyond
+        it."""
         return (not self.min_included and target <= self.mu_min) or (
             not self.max_included and target >= self.mu_max
         )
 
     def beside(self, target: float) -> tuple[str, str]:
-        """Return the target and the range of means in words, with so many digits that both differ
-        where the numbers do.
+        """Return the target and the range of means as text, with enough digits to show that they
+        differ.
 
         >>> Reach(0.0, 1.0, 0.17172206, 0.3).beside(0.171722)
         ('0.171722', '0.1717221 to 0.3')
@@ -50,7 +52,7 @@ class Reach:
 
 
 def _apart(end: float, target: float) -> int:
-    """Return how many digits show that two numbers differ, at least 4."""
+    """Return how many digits, at least 4, show that two numbers differ."""
     return next((n for n in range(4, 17) if _shown(end, n) != _shown(target, n)), 4)
 
 
@@ -60,24 +62,24 @@ def _shown(value: float, digits: int) -> str:
 
 @dataclass(frozen=True, repr=False)
 class Solution(Result):
-    """All roots of every target."""
+    """Hold all roots of every target."""
 
     unknown: str  #: the input that was solved for
-    of: str  #: "mu_macro", or of a motion "mu_lateral"
+    of: str  #: "mu_macro", or for a motion "mu_lateral"
     targets: tuple[float, ...]  #: the wanted values [-]
-    #: of each target, ascending; empty where it is not reachable.  A range of the unknown in which
-    #: every place is a root is one root from ``low`` to ``high``
+    #: the roots of each target, ascending; empty if it is not reachable.  A range of the unknown in
+    #: which every place is a root is one root with its ``low`` and ``high``
     roots: tuple[tuple[Any, ...], ...]
     reach: Reach  #: what is reachable in the range of the search
-    #: True when the unknown has no influence within the error, such as v0 without oscillation: a
-    #: target then has one root, the whole range, or none
+    #: True if the unknown has no influence within the error, such as v0 without oscillation.  Then
+    #: a target has one root, the whole range, or no root
     constant: bool
     _root: ClassVar[Any]
 
     @property
     def value(self) -> float:
-        """The one root of the one target [SI], a phase in degrees; InputError where there are none
-        or several, or where every value is one."""
+        """Return the one root of the one target [SI], a phase in degrees.  Raise InputError if
+        there is not exactly one root, or if every value is a root."""
         every = [root for of_target in self.roots for root in of_target]
         if len(every) == len(self.roots) == 1 and not self.constant:
             return float(every[0].value)
@@ -94,14 +96,14 @@ class Solution(Result):
 
     @property
     def unit(self) -> str:
-        """The unit of the unknown: SI, of a phase degrees."""
+        """Return the unit of the unknown: SI; degrees for a phase."""
         return unit_of(self.unknown)
 
     def reason(self, index: int = 0) -> str:
-        """Return why a target has no root, or over which range every value is one; empty where it
-        has roots alone."""
+        """Return why a target has no root, or over which range every value is a root.  Return an
+        empty text if it has only single roots."""
         reach, unknown = self.reach, self.unknown
-        where = f"any {unknown}"  # all that a double holds
+        where = f"any {unknown}"  # beyond this limit is the end of double range
         if reach.high < NO_LIMIT:
             where = f"{unknown} from {reach.low:.6g} to {reach.high:.6g} {self.unit}"
         if self.constant:
@@ -121,7 +123,7 @@ class Solution(Result):
         return f"{self.of} = {target} is out of reach: {where} gives {means}"
 
     def _is_range(self, root: Any) -> bool:
-        """Return whether a root is so wide that it is no place but a range."""
+        """Return whether a root is so wide that it is a range."""
         scale = _DEGREES if self.unit == "deg" else abs(root.value)
         return bool(root.high - root.low > _WIDE * scale)
 
@@ -129,7 +131,7 @@ class Solution(Result):
         return {"unknown": self.unknown, "unit": self.unit, **self._answers()}
 
     def _answers(self) -> dict[str, Any]:
-        """Return the roots, what was searched, and what is reachable there."""
+        """Return the roots, the range of the search, and the reachable values."""
         reach = self.reach
         return {
             "results": self._results(),
@@ -143,7 +145,7 @@ class Solution(Result):
         }
 
     def _results(self) -> list[dict[str, Any]]:
-        """Return the targets with their roots, and what is to be said of them."""
+        """Return the targets with their roots and remarks."""
         return [
             {
                 "target": target,
@@ -155,7 +157,8 @@ class Solution(Result):
 
     @property
     def columns(self) -> dict[str, Any]:
-        """The roots as a table, one row a root: target, and what each root has."""
+        """Return the roots as a table, one row for each root: the target, and the values of the
+        root."""
         rows = [
             (target, *root)
             for target, of_target in zip(self.targets, self.roots, strict=True)
@@ -174,7 +177,7 @@ class Solution(Result):
         return f"<{name} for {self.unknown} [{unit}], {self.of}: {counts}>"
 
     def _one_root(self) -> Any:
-        """Return the root of the only target, where it has one that is no range."""
+        """Return the root of the only target, if it has one root that is not a range."""
         every = [root for roots in self.roots for root in roots]
         alone = len(every) == len(self.targets) == 1 and not self.reason()
         return every[0] if alone else None

@@ -1,6 +1,7 @@
-"""The inverse problem: which values of one input give a mu_macro.
+"""Solve the inverse problem: find which values of one input give a wanted mu_macro.
 
-The course of mu_macro over one input, the others constant, for an oscillation across:
+mu_macro over one input behaves as follows, if the other inputs are constant and the oscillation is
+across:
 
 =====  =====================================  =====================================================
 input  course                                 roots
@@ -17,17 +18,18 @@ mu0    rises: it would fold only where        one
        constant r; it is 0.09 at the most
 =====  =====================================  =====================================================
 
-The figures are of the tightest table, for one spring and r up to 1e8; a ball does the same, later
-and less. Along and normal every input has one root, and mu0 is reached: where the upper point never
-moves backwards, or the springs slide all the time.  There mu_macro falls with k and rises with Fz
-(along), and rises with both (normal).
+The figures are for the tightest table, one spring, and r up to 1e8; a ball behaves in the same way,
+but at larger r and more weakly.  For along and normal every input has one root, and mu0 is reached
+where the upper point never moves backwards, or the springs slide all the time.  There mu_macro
+falls with k and rises with Fz (along), and rises with both (normal).
 
-Where k grows with the load as Fz^m, m < 1, v~ and y~ go like Fz^(m-1) (across and along): mu_macro
-runs through the same values in the same order, its turning points and its border are as many, and
-stand in ln Fz 1/(1 - m) times as far apart.  For m = 1 it is constant.  For normal it rises with Fz
-at constant k and rises with k, so it rises with Fz for every m, up to mu0 where that is reached.
+If k grows with the load as Fz^m, m < 1, then v~ and y~ are proportional to Fz^(m-1) (across and
+along). mu_macro then passes through the same values in the same order.  It has the same number of
+turning points and borders, and their distances in ln Fz are 1/(1 - m) times larger.  For m = 1 it
+is constant.  For normal, mu_macro rises with Fz at constant k and with k, so it rises with Fz for
+every m, up to mu0 where that is reached.
 
-How the roots are found: :mod:`mumacro.questions.search`.
+:mod:`mumacro.questions.search` finds the roots.
 """
 
 import math
@@ -54,22 +56,23 @@ from mumacro.validity import digits, effect_of_groups, load_notes
 HUGE = 1.7976931348623157e308
 _DRAWN = 400  # points of a curve in a picture
 
-# A ray of constant r = y0 omega / v0 is searched for turning points at this many places a decade.
-# At r = 10, three percent above its onset, the fold is a sixth of a decade wide; the steep descent
-# (y~ = 1 at large r) holds none. Where mu_macro is monotone, samples only bracket roots.
+# A ray of constant r = y0 omega / v0 is searched for turning points with this many samples a
+# decade.  At r = 10, three per cent above the smallest r with a fold, the fold is a sixth of a
+# decade wide.  The steep part (y~ = 1 at large r) has no fold.  Where mu_macro is monotone, samples
+# only bracket roots.
 _PER_DECADE, _PER_DECADE_MONOTONE = 100, 2
-# Direction -> y~, for normal v~/z, of a contact as soft and as stiff as it matters.  Across, mu~ =
-# 1 - O(y~^2), along 1 - O(y~); reverse slip may begin at y~ = 3/c^3, where the angle c =
-# arccos(v~/y~) is 1e-8 or more.
+# Direction -> y~ (for normal: v~/z) of a contact so soft, and so stiff, that more makes no
+# difference.  Across, mu~ = 1 - O(y~^2); along, 1 - O(y~).  Reverse slip may begin at y~ = 3/c^3,
+# where the angle c = arccos(v~/y~) is 1e-8 or more.
 _ENDS = {"across": (1e-6, 1e8), "along": (1e-17, 1e30), "normal": (1e-17, 10.0)}
 
 
 class Root(NamedTuple):
-    """One value of the unknown."""
+    """Hold one value of the unknown."""
 
     value: float  #: the unknown [SI]
-    #: between them mu_macro is within the surrogate's error bound of the target: the true root
-    #: cannot be distinguished from any of these values [SI]
+    #: between them mu_macro differs from the target by less than the error bound, so any of these
+    #: values may be the true root [SI]
     low: float
     high: float
     mu_macro: float  #: the surrogate's value there [-]
@@ -78,29 +81,29 @@ class Root(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class TableSolution(Solution):
-    """All roots of every target, from a table."""
+    """Hold all roots of every target, found with a table."""
 
     _root = Root
-    #: of an interval of k, whose geometric middle the rest is for: the solutions for its lowest and
-    #: its highest value
+    #: with an interval of k: the solutions for its lowest and its highest value; the other fields
+    #: are for its geometric middle
     ends: tuple["TableSolution", "TableSolution"] | None = None
-    #: how k grows with Fz, where that is solved for; None where k is constant
+    #: how k grows with Fz, if Fz is the unknown; None if k is constant
     stiffening: Stiffening | None = None
-    #: what was searched; of an interval of k at its middle
+    #: the curve that was searched; k is the middle of its interval
     curve: InputCurve | None = field(default=None, compare=False)
-    #: the range that was asked for [SI]; None for the default one
+    #: the range that the caller asked for [SI]; None for the default range
     within: tuple[float, float] | None = field(default=None, compare=False)
 
     def _members(self) -> dict[str, Any]:
-        """Return what every solution has; ``ends`` have the answers of the softest and the stiffest
-        contact of an interval of k."""
+        """Return the members of every solution; ``ends`` has the answers for the softest and the
+        stiffest contact of an interval of k."""
         ends = {"ends": [end._answers() for end in self.ends]} if self.ends else {}
         model = {"model": [note.as_row for note in self.notes]} if self.notes else {}
         return {**super()._members(), **ends, **model}
 
     @property
     def digits(self) -> int:
-        """The digits that k supports, at the first root."""
+        """Return the number of digits that the uncertainty of k supports, at the first root."""
         first = next((root for roots in self.roots for root in roots), None)
         if self.curve is None or first is None:
             return digits(0.0)
@@ -110,18 +113,18 @@ class TableSolution(Solution):
 
     @property
     def notes(self) -> list[Note]:
-        """On k, where Fz is solved for."""
+        """Return the notes about k, if Fz is the unknown."""
         if self.curve is None:
             return []
         contact = self.curve.kind.names["contact"]
         return load_notes(self.unknown, self.curve.case, contact, self.stiffening)
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw the law over the unknown with the targets and their roots, over the range that was
-        asked for, or a decade around the roots; of an interval of k its band, and the roots at its
-        ends, too.
+        """Draw the law over the unknown with the targets and their roots.  Draw it over the range
+        that was asked for, or over a decade around the roots.  For an interval of k also draw its
+        band, and the roots at its ends.
 
-        ``ax`` are axes of matplotlib, or new ones; they are returned.
+        ``ax`` are matplotlib axes, or None for new ones.  They are returned.
         """
         if self.curve is None:
             raise TypeError("a solution that solve_for has not made has no picture")
@@ -163,7 +166,7 @@ class TableSolution(Solution):
 
 
 def _around(roots: Sequence[float]) -> tuple[float, float]:
-    """Return a decade around roots; what is at 0 is shown up to 1."""
+    """Return a range of a decade around the roots; roots at 0 are shown in the range up to 1."""
     least, most = min(roots), max(roots)
     return 0.1 * least or 1e-6 * (most or 1.0), 10.0 * most or 1.0
 
@@ -186,27 +189,27 @@ def solve_for(
     ----------
     surrogate : Surrogate
     unknown : str
-        One of mu0, Fz, k, y0, omega, f, v0; for direction normal Fz_amplitude in place of y0.
+        One of mu0, Fz, k, y0, omega, f, v0; for direction normal Fz_amplitude instead of y0.
     target : array_like
         mu_macro [-], >= 0, shape (n,) or a scalar.
     within : (float, float), optional
-        Search range [SI], or with units as in ("1um", "1mm").  Left out: everywhere for v0, y0,
-        omega, f and Fz_amplitude (below Fz); for k, Fz and mu0 from where the contact is so soft
-        that it does not matter to where it is as good as rigid.
+        Search range [SI], or with units as in ("1um", "1mm").  Default: all values of v0, y0,
+        omega, f and Fz_amplitude (below Fz); for k, Fz and mu0 the range from a contact so soft
+        that softer makes no difference to one that is as good as rigid.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
     stiffness_exponent : float, optional
-        For Fz only, m in k = k_given (Fz/Fz_given)^m, from 0 to 1, where ``Fz`` of the case is
+        For Fz only: m in k = k_given (Fz/Fz_given)^m, from 0 to 1, where ``Fz`` of the case is
         Fz_given: see :func:`mumacro.law`.
     **case : float
-        The other five inputs [SI]; ``k`` "rigid" or infinite is rigid contact; ``f`` [Hz] may stand
-        for ``omega``; ``k_low`` and ``k_high`` for ``k``: see
-        ``TableSolution.ends``.
+        The other five inputs [SI].  ``k`` "rigid" or infinite is a rigid contact.  ``f`` [Hz] may
+        replace ``omega``; ``k_low`` and ``k_high`` may replace ``k``: see ``TableSolution.ends``.
 
     Raises
     ------
     InputError
-        A value out of bounds, an unknown that is given or does not exist, an invalid range.
+        If a value is out of bounds, the unknown is given or does not exist, or the range is
+        invalid.
 
     Examples
     --------
@@ -220,7 +223,8 @@ def solve_for(
     name, (unknown, per) = unknown, field_of(unknown)
     ends = None if within is None else _ends(name, within)
     if per != 1.0:
-        fixed_inputs(without_interval(case)[0], name, kind)  # messages name what was asked for
+        # messages use the caller's name of the unknown
+        fixed_inputs(without_interval(case)[0], name, kind)
         solution = solve_for(
             surrogate,
             unknown,
@@ -259,7 +263,7 @@ def solve_for(
 
 
 def _levels(target: Numbers) -> Array:
-    """Return the targets, (n,); InputError for one that mu_macro cannot be."""
+    """Return the targets, (n,).  Raise InputError if mu_macro cannot have this value."""
     levels = real("target", target).ravel()
     bad = np.flatnonzero(~(np.isfinite(levels) & (levels >= 0.0)))
     if bad.size:
@@ -271,7 +275,7 @@ def _levels(target: Numbers) -> Array:
 def _solution_over(
     curve: InputCurve, levels: Array, within: tuple[float, float] | None
 ) -> TableSolution:
-    """Return the roots of each level on a curve, in a range or in the default one."""
+    """Return the roots of each target on a curve, in a range or in the default range."""
     unknown = curve.unknown
     low, high = _default_range(curve, levels) if within is None else _checked_range(curve, within)
     folds = unknown in ("k", "Fz") and curve.kind.names["direction"] == "across"
@@ -303,7 +307,8 @@ def _solution_over(
 
 
 def _in_unit(solution: TableSolution, unknown: str, per: float) -> TableSolution:
-    """Return a solution by another name of the unknown, whose unit has ``per`` of the field's."""
+    """Return a solution under another name of the unknown; ``per`` of the field's unit are one of
+    its unit."""
     roots = tuple(
         tuple(
             root._replace(value=root.value / per, low=root.low / per, high=root.high / per)
@@ -329,7 +334,7 @@ def _ends(unknown: str, within: Any) -> tuple[float, float]:
 
 
 def _legal(curve: InputCurve) -> tuple[float, float]:
-    """Return smallest and largest legal value of the unknown."""
+    """Return the smallest and the largest legal value of the unknown."""
     low, high = TINY if curve.unknown in POSITIVE else 0.0, HUGE
     if curve.kind.normal and curve.unknown == "Fz":
         low = math.nextafter(curve.case[AMPLITUDE], math.inf)
@@ -348,8 +353,8 @@ def _checked_range(curve: InputCurve, within: tuple[float, float]) -> tuple[floa
 
 
 def _default_range(curve: InputCurve, targets: Array) -> tuple[float, float]:
-    """Return all legal values; or from a soft contact to a rigid one, to 1e-12 or so, and further
-    where the targets need it."""
+    """Return the default range: all legal values; or, for k, Fz and mu0, from a soft contact to a
+    rigid one, to about 1e-12, and further if the targets need it."""
     case, unknown, (least, most) = curve.case, curve.unknown, _legal(curve)
     if unknown in EVERYWHERE:
         return least, most
@@ -362,7 +367,7 @@ def _default_range(curve: InputCurve, targets: Array) -> tuple[float, float]:
 
 
 def _soft_to_rigid(curve: InputCurve, targets: Array, least: float) -> tuple[float, float]:
-    """Return the range for k, Fz and mu0, whose smallest legal value is ``least``."""
+    """Return the range for k, Fz and mu0; ``least`` is the smallest legal value."""
     case, unknown = curve.case, curve.unknown
     amplitude = case[AMPLITUDE if curve.kind.normal else "y0"]
     if 0.0 in (amplitude, case["omega"]) or curve.proportional:
@@ -380,7 +385,7 @@ def _soft_to_rigid(curve: InputCurve, targets: Array, least: float) -> tuple[flo
         r = math.exp(min(log_r, 230.0))
         stiff = max(stiff, stiff * r, 1e3 * r * r)
     low, high = sorted((curve.where(soft), curve.where(stiff)))
-    if unknown == "mu0":  # mu_macro grows with it without limit
+    if unknown == "mu0":  # mu_macro grows with mu0 without limit
         positive = targets[targets > 0.0]
         low, high = (
             0.5 * float(positive.min(initial=2.0 * low)),
@@ -390,14 +395,14 @@ def _soft_to_rigid(curve: InputCurve, targets: Array, least: float) -> tuple[flo
 
 
 def _without_limit(curve: InputCurve, reach: Reach) -> Reach:
-    """Return ``reach`` as v0, y0 or omega grows without limit: the last value is approached, and in
-    general not reached."""
+    """Return ``reach`` for a v0, y0 or omega that grows without limit: the last value is approached
+    but usually not reached."""
     if curve.unknown == "v0":
         return replace(reach, max_included=curve.kind.direction > 0)
     if curve.unknown == AMPLITUDE:
         return reach
     vanishes = curve.unknown == "y0" or curve.case["k"] == math.inf
-    # at rest friction takes its last value at y0 = l0, or at any frequency
+    # at rest mu_macro reaches its last value at y0 = l0, or at any frequency
     return replace(
         reach, mu_min=0.0 if vanishes else reach.mu_min, min_included=curve.case["v0"] == 0.0
     )
