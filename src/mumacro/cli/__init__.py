@@ -1,1 +1,1 @@
-"""The command ``mumacro``."""
+"""Run the command ``mumacro``."""

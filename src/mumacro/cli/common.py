@@ -1,5 +1,5 @@
-"""What all commands share: one look of the arguments, exit codes, cases and tables as a person
-writes them."""
+"""Define what all commands share: the layout of the help, exit codes, and how to read cases and
+tables that a person writes."""
 
 import argparse
 import csv
@@ -57,29 +57,29 @@ CURVE = 400  # points of a curve in a picture
 
 
 class UsageError(Exception):
-    """The command is written wrongly; one line, with the remedy."""
+    """Report a command that is written wrongly, in one line with the remedy."""
 
 
 class ImpossibleError(MumacroError):
-    """The request is valid and has no result; one line, with the reason."""
+    """Report a valid request that has no result, in one line with the reason."""
 
 
 class _Lines(RawDescriptionHelpFormatter):
-    """Help of 100 columns, an option a line: most of it fits a screen."""
+    """Format the help in 100 columns, one option per line, so that most of it fits a screen."""
 
     def __init__(self, prog: str) -> None:
         super().__init__(prog, max_help_position=34, width=100)
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """A fault, reported in one line."""
+    """Parse arguments; report a fault in one line."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(formatter_class=_Lines, allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
-        """End the program with code 2 and the fault, with the choice that may have been meant, or
-        with the example of the help where something is missing."""
+        """End the program with code 2 and the fault.  Add the choice that was probably meant, or
+        the example of the help if something is missing."""
         fault, _, offer = message.rpartition(" (choose from ")
         _, wrong, choice = fault.rpartition(": invalid choice: ")
         if wrong:
@@ -106,8 +106,8 @@ def question(
     least: str = "+",
     first: tuple[str, dict[str, Any]] | None = None,
 ) -> OneLineParser:
-    """Return the parser of a command that is given a case and has ``-o``; ``first`` is an argument
-    that stands before it."""
+    """Return the parser of a command that takes a case and ``-o``; ``first`` is an argument before
+    the case."""
     parser = OneLineParser(prog=f"mumacro {name}", description=description, epilog=epilog)
     if first:
         parser.add_argument(first[0], **first[1])
@@ -122,8 +122,8 @@ def question(
 
 
 def add_case(parser: OneLineParser, words: str, least: str = "+") -> None:
-    """Add the inputs, explained by ``words``, the kind of contact, and the options of all commands
-    that answer."""
+    """Add the inputs, explained by ``words``, the options for contact and direction, and the
+    options of all commands that answer."""
     parser.add_argument("words", nargs=least, metavar="name=value", help=words)
     add_kind(parser)
     add_table(parser)
@@ -140,19 +140,19 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
 
 
 def add_include(parser: argparse.ArgumentParser) -> None:
-    """Add the option for outputs beside mu_macro."""
+    """Add the option for more outputs than mu_macro."""
     text = ", ".join(OUTPUTS)
     parser.add_argument("--include", action="append", default=[], metavar="NAMES", help=text)
 
 
 def included(options: argparse.Namespace) -> tuple[str, ...]:
-    """Return the outputs that ``--include`` names; InputError for an unknown one."""
+    """Return the outputs that ``--include`` names.  Raise InputError for an unknown one."""
     return tuple(name for text in options.include for name in names_in(text))
 
 
 def kind_in(options: argparse.Namespace) -> Kind:
-    """Return the contact and direction that were chosen; InputError for a ball whose normal force
-    oscillates."""
+    """Return the contact and the direction from the options.  Raise InputError for a ball whose
+    normal force oscillates."""
     return kind_of(options.contact, options.direction)
 
 
@@ -178,10 +178,10 @@ def add_form(parser: argparse.ArgumentParser) -> None:
 
 
 def run(title: str, command: Callable[[Any], int | str], arguments: Any) -> int:
-    """Run a command, print the text that it returns, and return the exit code; an error is one line
-    on stderr."""
+    """Run a command, print the text that it returns, and return the exit code.  Print an error as
+    one line on stderr."""
     for stream in (sys.stdout, sys.stderr):
-        # a sign that a terminal's codec lacks must not end a run whose output is written
+        # a character that the terminal cannot show must not end a run whose output is written
         if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
             stream.reconfigure(errors="backslashreplace")
     try:
@@ -220,14 +220,14 @@ def read_case(
     optional: Sequence[str] = (),
     deviations: bool = False,
 ) -> dict[str, Any]:
-    """Return the inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI; keywords of
+    """Return the inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI, as keywords of
     ``Surrogate.evaluate``.
 
-    ``without`` are unknown or swept inputs, which must not be there; ``one_k`` says why ``k`` must
-    not be an interval here, which otherwise becomes ``k_low`` and ``k_high``; where ``whole``, all
-    other inputs must be there, but for those that are ``optional``.  With ``deviations`` those
-    that are typed, as in ``k=1±0.1N/um``, become ``std_k`` and so on.  UsageError tells everything
-    that is wrong, in one line.
+    ``without`` are unknown or swept inputs, which must not be there.  ``one_k`` says why ``k`` must
+    not be an interval here; if it is empty, an interval becomes ``k_low`` and ``k_high``.  If
+    ``whole``, all other inputs must be there, except those in ``optional``.  With ``deviations`` a
+    typed one, as in ``k=1±0.1N/um``, becomes ``std_k`` and so on.  UsageError lists all faults in
+    one line.
 
     >>> read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20kHz v0=0.01"])["k"]
     1000000.0
@@ -243,7 +243,7 @@ def read_case(
             continue
         if name not in allowed:
             similar = suggestion(name)
-            case[similar or name] = math.nan  # not reported as missing, too
+            case[similar or name] = math.nan  # so that it is not reported as missing, too
             faults.append(_unknown(name, text, similar, kind))
             continue
         try:
@@ -268,9 +268,9 @@ def read_case(
 
 
 def _read(name: str, text: str, one_k: str, deviations: bool) -> dict[str, float]:
-    """Return what a text says of an input: its value, with its deviation, or both ends of k.
+    """Return what a text says about an input: its value, with its deviation, or both ends of k.
 
-    Raise InputError where it says none, or one out of bounds.
+    Raise InputError if the text is not a value, or the value is out of bounds.
     """
     value = read(name.removeprefix("std_"), text)
     if name.startswith("std_"):
@@ -292,7 +292,7 @@ def _read(name: str, text: str, one_k: str, deviations: bool) -> dict[str, float
 
 
 def _unknown(name: str, text: str, similar: str | None, kind: Kind) -> str:
-    """Return why a name is refused, and what to write."""
+    """Return why a name is refused, and what to write instead."""
     if name in ("contact", "direction"):
         return f"{name} is an option: --{name} {text}"
     if name == AMPLITUDE:
@@ -306,7 +306,8 @@ def _unknown(name: str, text: str, similar: str | None, kind: Kind) -> str:
 
 
 def _pairs(words: Sequence[str]) -> list[tuple[str, str | None]]:
-    """Name and value of each ``name=value``; a unit may stand apart; other words have no value."""
+    """Return name and value of each ``name=value``.  A unit may follow after a space.  Other words
+    have no value."""
     pairs: list[tuple[str, str | None]] = []
     text = " ".join(" ".join(words).split())
     for word in text.replace(" =", "=").split():
@@ -322,8 +323,8 @@ def _pairs(words: Sequence[str]) -> list[tuple[str, str | None]]:
 
 
 def _is_name(word: str) -> bool:
-    """Return whether a word stands for an input and has no value; else it belongs to the value
-    before it, and is refused with that where it is no part of one."""
+    """Return whether a word is the name of an input without a value.  Any other word belongs to the
+    value before it, and is refused with this value if it does not fit."""
     if word in (*INPUTS, *KIND):
         return True
     return not belongs_to_value(word) and suggestion(word, loosely=False) is not None
@@ -353,8 +354,8 @@ def _faults_of_names(
 def other_meaning(
     target: float, is_ratio: bool, case: Mapping[str, Any], holds: Callable[[float], bool]
 ) -> str:
-    """Return the option that was perhaps forgotten or too much, where a target is out of reach: it
-    may be mu_macro, or its ratio to mu0. ``holds`` says whether a mu_macro is in reach."""
+    """Return the option that was perhaps forgotten or unnecessary, if a target is out of reach: it
+    may be mu_macro, or its ratio to mu0.  ``holds`` tells whether a mu_macro is in reach."""
     mu0 = case.get("mu0")
     if not mu0 or not holds(target if is_ratio else target * mu0):
         return ""
@@ -364,20 +365,20 @@ def other_meaning(
 
 
 def without_or_load(unknown: str) -> dict[str, Any]:
-    """Return keywords of ``read_case``: the unknown must not be there; Fz may be, as the load at
-    which k holds."""
+    """Return keywords of ``read_case``: the unknown must not be there, but Fz may be, as the load
+    at which k holds."""
     return {"optional": ["Fz"]} if unknown == "Fz" else {"without": [unknown]}
 
 
 def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a case with the geometric middle in place of an interval of k."""
+    """Return a case in which the geometric middle replaces an interval of k."""
     one_k, _ = without_interval(case)
     return {name: float(x) if isinstance(x, np.ndarray) else x for name, x in one_k.items()}
 
 
 def typed_units(words: Sequence[str], **texts_of: Sequence[str]) -> dict[str, str]:
-    """Return the units that were typed, by input; ``texts_of`` an input are others of it, such as
-    the ends of a range, which come first.
+    """Return the units that were typed, by input.  ``texts_of`` has more texts of an input, such as
+    the ends of a range; they come first.
 
     >>> typed_units(["mu0=0.3 Fz=10N", "k=1 N/um v0=1mm/s"], v0=["0.1m/s", "1"])
     {'v0': 'm/s', 'Fz': 'N', 'k': 'N/um'}
@@ -394,7 +395,7 @@ def typed_units(words: Sequence[str], **texts_of: Sequence[str]) -> dict[str, st
 def case_line(
     case: Mapping[str, Any], units: Mapping[str, str], kind: Kind, *oscillations: str
 ) -> str:
-    """Return the case that was understood, in the units that were typed, and its
+    """Return the case as the program understood it, in the units that were typed, and its
     ``oscillations``."""
     parts = []
     for name, value in case.items():
@@ -414,8 +415,8 @@ def case_line(
 
 
 def number_of(name: str, advice: str = "") -> Callable[[str], float]:
-    """Return the reader of an option that is a number, as 0.15, 0,15 or 15%; argparse says the
-    fault of another text, with the ``advice``."""
+    """Return a function that reads an option with a number, as 0.15, 0,15 or 15%. For another text
+    argparse reports the fault with the ``advice``."""
 
     def number(text: str) -> float:
         try:
@@ -427,8 +428,8 @@ def number_of(name: str, advice: str = "") -> Callable[[str], float]:
 
 
 def read_values(pairs: Iterable[tuple[str, str]], reader: Callable[[str, str], Any]) -> list[Any]:
-    """Return values from pairs of name and text, with or without a unit, in SI; UsageError names
-    all that are none."""
+    """Return values in SI from pairs of name and text, with or without a unit.  UsageError names
+    all texts that are not values."""
     values, faults = [], []
     for name, text in pairs:
         try:
@@ -455,7 +456,7 @@ def open_table(table: str | None) -> Surrogate:
 
 
 def table_members(surrogate: Surrogate) -> dict[str, Any]:
-    """Return what names a table in JSON."""
+    """Return the members that identify a table in JSON."""
     return {"id": surrogate.id, "tolerance": surrogate.tolerance}
 
 
@@ -471,7 +472,7 @@ def in_columns(rows: Iterable[Sequence[str]]) -> str:
 
 
 def note_lines(notes: Iterable[Note]) -> list[str]:
-    """Return what is said below a result."""
+    """Return the lines below a result."""
     return [in_columns([(note.word, note.about)]) for note in notes]
 
 
@@ -481,8 +482,8 @@ def write_result(
     draw: Callable[[Any], Any],
     panels: plotting.Panels = plotting.Panels(),  # noqa: B008 - it cannot change
 ) -> str:
-    """Write ``-o x.csv``, the columns under their heads with all digits, or a picture; a line that
-    names the file."""
+    """Write ``-o``: x.csv with the columns under their headers, with all digits; or a picture.
+    Return a line that names the file."""
     if path.suffix == ".csv":
         with path.open("w", encoding="utf-8", newline="") as stream:
             rows = csv.writer(stream, lineterminator="\n")
@@ -496,5 +497,5 @@ def write_result(
 
 
 def as_json(value: object) -> str:
-    """Return JSON in which what is not finite is null."""
+    """Return JSON in which a number that is not finite is null."""
     return json.dumps(listed(value), indent=2)

@@ -1,4 +1,4 @@
-"""``mumacro eval``: files of cases from the command line."""
+"""Run ``mumacro eval``: evaluate files of cases from the command line."""
 
 import shutil
 import sys
@@ -36,7 +36,7 @@ exit codes: 0 all rows, 3 some are rejected, 1 could not run, 2 wrong arguments,
 
 
 def _standard_input(folder: Path) -> Path:
-    """Return standard input as a file, in the format that it begins like."""
+    """Return standard input as a file, in the format that its first bytes show."""
     path = folder / "standard-input"
     with path.open("w+b") as stream:
         shutil.copyfileobj(sys.stdin.buffer, stream, 2**20)
@@ -49,7 +49,7 @@ def _standard_input(folder: Path) -> Path:
 
 
 class _Bar(Progress):
-    """The share of the rows that are evaluated, on a terminal."""
+    """Show the fraction of the rows that are evaluated, on a terminal."""
 
     def __init__(self, console: Console) -> None:
         super().__init__(
@@ -63,13 +63,13 @@ class _Bar(Progress):
         self._rows = self.add_task("", total=1.0)
 
     def show(self, share: float, rows: int, rejected: int) -> None:
-        """Show how many rows are read, and how many of these are rejected."""
+        """Show how many rows are read, and how many of them are rejected."""
         description = f"{rows:,} rows, {rejected:,} rejected"
         self.update(self._rows, completed=share, description=description)
 
 
 def _parser() -> OneLineParser:
-    """Return the arguments of the command."""
+    """Return the parser of the command's arguments."""
     parser = OneLineParser(
         prog="mumacro eval",
         description="Evaluate every case of files: Parquet, text, .xlsx. "
@@ -101,8 +101,7 @@ def _parser() -> OneLineParser:
 
 
 def main(words: Sequence[str]) -> int:
-    """Run ``mumacro eval``; return the exit code; what is wrong is an error for
-    :func:`mumacro.cli.common.run`."""
+    """Run ``mumacro eval`` and return the exit code. :func:`mumacro.cli.common.run` reports errors."""
     options = _parser().parse_intermixed_args(words)
     surrogate = open_table(options.table)
     console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
@@ -149,7 +148,7 @@ def main(words: Sequence[str]) -> int:
 
 
 def _remark(remark: Remark) -> str:
-    """Return a remark in the last line."""
+    """Return the text of a remark for the last lines."""
     cases = remark["cases"]
     rows = f" in {cases:,} rows" if cases > 1 else ""
     return f"; remark on {remark['field']}{rows}: {remark['text']}"

@@ -1,4 +1,4 @@
-"""``mumacro fit``: k and mu0 from measured points in a file."""
+"""Run ``mumacro fit``: fit k and mu0 to measured points in a file."""
 
 import math
 import sys
@@ -42,7 +42,7 @@ examples:
 
 
 def _parser() -> OneLineParser:
-    """Return the arguments of the command."""
+    """Return the parser of the command's arguments."""
     first = "points", {"help": "a table as text, or .xlsx; - is standard input"}
     description = "k and mu0 of a contact from measured friction."
     parser = common.question("fit", description, _COLUMNS, "the other inputs", "*", first)
@@ -89,7 +89,7 @@ def run(words: Sequence[str]) -> str:
         at_line = f"line {table.lines[error.index]}: " if error.index is not None else ""
         fault = InputError(error.field, error.value, error.bound) if at_line else error
         raise ImpossibleError(f"{options.points}: {at_line}{fault}") from None
-    except ModuleNotFoundError as error:  # says what to install
+    except ModuleNotFoundError as error:  # it says what to install
         raise ImpossibleError(str(error)) from None
     output = _output(result, options, surrogate)
     if table.read_as:
@@ -98,7 +98,7 @@ def run(words: Sequence[str]) -> str:
 
 
 def _output(result: Fit, options: Namespace, surrogate: Surrogate) -> str:
-    """Write the file that is asked for; return what is printed."""
+    """Write the file of ``-o``, and return the text to print."""
     if options.out is not None:
         heads = [
             name if name in ("mu_macro", STD) else f"{name} [{unit_of(name)}]"
@@ -117,8 +117,8 @@ def _output(result: Fit, options: Namespace, surrogate: Surrogate) -> str:
 
 
 def _text(result: Fit, digit_count: int | None) -> str:
-    """Return values with standard deviations and intervals, the scatter, other solutions,
-    warnings."""
+    """Return the text of the result: values with standard deviations and intervals, the scatter,
+    other solutions, warnings."""
     rows: list[Sequence[str]] = []
     for name, value in result.values.items():
         off, (low, high) = result.std[name], result.interval[name]

@@ -1,4 +1,4 @@
-"""``mumacro fit-loop``: k and mu0 from a measured loop of force over displacement in a file."""
+"""Run ``mumacro fit-loop``: fit k and mu0 to a measured loop of force over displacement in a file."""
 
 import argparse
 import sys
@@ -31,7 +31,7 @@ examples:
 
 
 def _cycles(text: str) -> tuple[int, int]:
-    """Return the first and the last cycle; argparse says the fault of another text."""
+    """Return the first and the last cycle; argparse reports a fault in another text."""
     first, _, last = text.partition("..")
     if not (first.isdecimal() and (last or first).isdecimal()):
         raise argparse.ArgumentTypeError(f"{text!r}: must be numbers of cycles, as 3..8")
@@ -39,7 +39,7 @@ def _cycles(text: str) -> tuple[int, int]:
 
 
 def _parser() -> OneLineParser:
-    """Return the arguments of the command."""
+    """Return the parser of the command's arguments."""
     description = "k and mu0 of a contact from a measured loop of force over displacement."
     parser = OneLineParser(prog="mumacro fit-loop", description=description, epilog=_ABOUT)
     parser.add_argument("loop", help="a table as text, or .xlsx; - is standard input")
@@ -87,7 +87,7 @@ def run(words: Sequence[str]) -> str:
         name = names.get(error.field, error.field)
         fault = InputError(name, error.value, error.bound)
         raise ImpossibleError(f"{options.loop}: {at_line}{fault}") from None
-    except ModuleNotFoundError as error:  # says what to install
+    except ModuleNotFoundError as error:  # it says what to install
         raise ImpossibleError(str(error)) from None
     if table.read_as:
         print(f"mumacro fit-loop: read as: {table.read_as}", file=sys.stderr)
@@ -102,7 +102,7 @@ def run(words: Sequence[str]) -> str:
 
 
 def _load(words: Sequence[str], column: str | None) -> Any:
-    """Return the normal force that is typed [N]; None where it is a column."""
+    """Return the normal force that was typed [N], or None if it is a column."""
     text = " ".join(words)
     name, equals, value = text.partition("=")
     if column is not None:
@@ -118,6 +118,6 @@ def _load(words: Sequence[str], column: str | None) -> Any:
 
 
 def _text(found: LoopFit) -> str:
-    """Return values with intervals, energy, scatter, and notes."""
+    """Return the text of the result: values with intervals, energy, scatter, and notes."""
     samples = ("samples", str(found.residuals.size), "", f"{found.contact}, {found.cycles} cycles")
     return "\n".join([in_columns([*found._rows(), samples]), *(note.line for note in found.notes)])

@@ -1,4 +1,4 @@
-"""``mumacro law``: mu_macro over a range of one input."""
+"""Run ``mumacro law``: print mu_macro over a range of one input."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -30,7 +30,7 @@ EXAMPLE = 'mumacro law "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz" --along v0 0.1mm/
 
 
 def _parser() -> OneLineParser:
-    """Return the arguments of the command."""
+    """Return the parser of the command's arguments."""
     description = (
         "mu_macro over a range of one input, with the static value and the border of "
         "continuous sliding."
@@ -96,7 +96,8 @@ def run(words: Sequence[str]) -> str:
 def _table(
     columns: Mapping[str, Any], units: Mapping[str, Unit], count: int, digits: int | None
 ) -> str:
-    """Return the columns of a law as text, those with a unit in it; ``source`` is left out."""
+    """Return the columns of a law as text; a column with a unit is in this unit, and ``source`` is
+    left out."""
     cells = {
         f"{name} [{units[name].symbol}]" if name in units else name: [
             _cell(x, name, units.get(name), count, digits, error)
@@ -111,7 +112,7 @@ def _table(
 def _cell(
     value: Any, name: str, unit: Unit | None, count: int, digits: int | None, error: float
 ) -> str:
-    """Return a cell: a text, or a number with the digits that are known."""
+    """Return a cell: a text, or a number with its significant digits."""
     if isinstance(value, str):
         return value
     if math.isnan(value):

@@ -1,7 +1,7 @@
-"""The command ``mumacro`` (``python -m mumacro``): macroscopic friction from the command line.
+"""Run the command ``mumacro`` (``python -m mumacro``): macroscopic friction from the command line.
 
-Exit codes: 0 done, 1 no result is possible (a table, a file, a package, a target out of reach), 2
-wrong arguments; ``mumacro eval`` also 3, done with rejected rows, and 130, interrupted.
+Exit codes: 0 done; 1 no result is possible (a table, a file, a package, a target out of reach); 2
+wrong arguments.  ``mumacro eval`` also has 3, done with rejected rows, and 130, interrupted.
 """
 
 import difflib
@@ -81,8 +81,7 @@ Command = Callable[[Sequence[str]], int | str]
 
 
 def _in_module(name: str) -> Command:
-    """Return a command whose module is loaded when it is called: one case starts sooner
-    without."""
+    """Return a command whose module is loaded when it is called, so that one case starts sooner."""
     return lambda words: importlib.import_module(f"mumacro.cli.{name}").run(words)
 
 
@@ -102,7 +101,7 @@ COMMANDS: dict[str, Command] = {
 
 
 def _first_steps() -> str:
-    """Return what a person sees who wrote nothing."""
+    """Return the text for a person who wrote no arguments."""
     from mumacro.cli import law, solve_for
 
     return (
@@ -114,7 +113,7 @@ def _first_steps() -> str:
 
 
 def _no_command(words: Sequence[str]) -> str:
-    """Return a case, or what helps a person who wrote something else."""
+    """Return the answer to a case, or advice if the words are neither a case nor a command."""
     if not words:
         return _first_steps()
     similar = difflib.get_close_matches(words[0], COMMANDS, n=1, cutoff=0.7)
@@ -124,7 +123,7 @@ def _no_command(words: Sequence[str]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit code."""
+    """Run the command and return the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words and words[0] in COMMANDS:
         return common.run(f"mumacro {words[0]}", COMMANDS[words[0]], words[1:])

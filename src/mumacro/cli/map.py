@@ -1,4 +1,4 @@
-"""``mumacro map``: the map of mu~, with a case on it."""
+"""Run ``mumacro map``: draw the map of mu~, with a case on it."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""``mumacro motion``: the friction under any periodic motion."""
+"""Run ``mumacro motion``: print the friction under any periodic motion."""
 
 import argparse
 from collections.abc import Sequence
@@ -41,8 +41,8 @@ def add_parts(parser: argparse.ArgumentParser) -> None:
 def read_motion(
     options: argparse.Namespace, optional: Sequence[str] = ()
 ) -> tuple[dict[str, Any], dict[str, Any], str]:
-    """Return the case and the oscillations that were typed, as keywords of
-    :func:`mumacro.motion`, and a line that says how both were understood.
+    """Return the case and the oscillations that were typed, as keywords of :func:`mumacro.motion`,
+    and a line that says how the program understood both.
 
     ``optional`` are inputs of the case that may be left out.
     """
@@ -59,7 +59,7 @@ def read_motion(
 
 
 def _parser() -> OneLineParser:
-    """Return the arguments of the command."""
+    """Return the parser of the command's arguments."""
     parser = OneLineParser(
         prog="mumacro motion",
         description="Mean friction and steady cycle of a contact that is dragged along x and "
@@ -105,7 +105,7 @@ def run(words: Sequence[str]) -> str:
 def _shown(
     name: str, value: float, unit: str, motion: Motion, digits: int | None
 ) -> tuple[str, str]:
-    """Return a number with the digits that its estimate leaves, and its unit."""
+    """Return a number with the digits that its error estimate allows, and its unit."""
     share = {"mu_macro": 1.0, "mu_lateral": 1.0}
     if name == "power_drive" and motion.mu_macro:  # mu_macro Fz v0
         share[name] = abs(value / motion.mu_macro)

@@ -1,4 +1,4 @@
-"""``mumacro "mu0=0.3 Fz=10N ..."``: the friction of one case."""
+"""Run ``mumacro "mu0=0.3 Fz=10N ..."``: print the friction of one case."""
 
 import argparse
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ EXAMPLE = "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz v0=10mm/s"
 
 
 def run(words: Sequence[str], description: str) -> str:
-    """Run ``mumacro "mu0=0.3 ..."``; ``description`` is what the help says of the whole command."""
+    """Run ``mumacro "mu0=0.3 ..."``; ``description`` is the text of the help for the whole command."""
     parser = OneLineParser(prog="mumacro", description=description + common.ABOUT_INPUTS)
     common.add_case(parser, "the six inputs, quoted together or apart")
     common.add_include(parser)

@@ -1,4 +1,4 @@
-"""``mumacro solve-for``: the values of one input that give a mu_macro."""
+"""Run ``mumacro solve-for``: print the values of one input that give a wanted mu_macro."""
 
 import argparse
 import difflib
@@ -27,12 +27,12 @@ EXAMPLE = 'mumacro solve-for y0 "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s" --tar
 _TARGET = ": give mu_macro, such as 0.15 or 15%, or with --ratio mu_macro/mu0"
 
 
-#: what may be unknown, of a case or of a motion
+#: possible unknowns, of a case or of a motion
 UNKNOWN = (*dict.fromkeys((*NAMES, AMPLITUDE, *UNKNOWNS)),)
 
 
 def _unknown(text: str) -> str:
-    """Return the name of an unknown; argparse says what another text may mean."""
+    """Return the name of an unknown; for another text argparse says what it may mean."""
     if text in UNKNOWN:
         return text
     similar = suggestion(text, loosely=False)
@@ -45,7 +45,7 @@ def _unknown(text: str) -> str:
 
 
 def _parser() -> OneLineParser:
-    """Return the arguments of the command."""
+    """Return the parser of the command's arguments."""
     description = "Every value of one input at which mu_macro is the target."
     epilog = (
         f"{common.ABOUT_INPUTS}\nexample, the amplitude [m] that halves the friction:\n"
@@ -130,7 +130,8 @@ def run(words: Sequence[str]) -> str:
 
 
 def _solutions_by_k(solution: TableSolution, case: Mapping[str, Any]) -> dict[Any, TableSolution]:
-    """Return the solution, of an interval of k also those of its ends, by k [N/m], ascending."""
+    """Return the solution, and for an interval of k also the solutions of its ends, by k [N/m],
+    ascending."""
     middle = common.middle_of(case).get("k")
     if solution.ends is None:
         return {middle: solution}
@@ -139,8 +140,8 @@ def _solutions_by_k(solution: TableSolution, case: Mapping[str, Any]) -> dict[An
 
 
 def _heads(unknown: str, k: str | None) -> list[str]:
-    """Return the heads of the columns of roots, from those of the unknown and, of an interval, of
-    k."""
+    """Return the headers of the columns of roots from the header of the unknown and, for an
+    interval, of k."""
     return [*([k] if k else []), unknown, "between", "and", "mu_macro [-]", "regime"]
 
 
@@ -152,7 +153,7 @@ def _table(
     count: int,
     digits: int | None,
 ) -> str:
-    """Return the roots as text, with their k where that is an interval."""
+    """Return the roots as text, with their k if it is an interval."""
     table = [_heads(f"{unknown} [{unit.symbol}]", k_unit and f"k [{k_unit.symbol}]")]
     for k, root in rows:
         of_k = [tidy_zeros(format_number(k, k_unit, 6, digits))] if k_unit else []
@@ -162,7 +163,7 @@ def _table(
 
 
 def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: TableSolution) -> str:
-    """Return what was perhaps meant where a target is out of reach."""
+    """Return what was perhaps meant if a target is out of reach."""
     if solution.constant:
         return ""
     return common.other_meaning(options.target, options.ratio, case, solution.reach.holds)

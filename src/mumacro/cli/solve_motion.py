@@ -1,5 +1,5 @@
-"""``mumacro solve-for ... --x --y --normal``: the values of one input of a motion that give a mean
-friction."""
+"""Run ``mumacro solve-for ... --x --y --normal``: print the values of one input of a motion that
+give a wanted mean friction."""
 
 import argparse
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ EXAMPLE = 'mumacro solve-for v0 "mu0=0.3 Fz=10N k=0.1N/um f=50Hz" --x 0.1mm --no
 
 
 def is_motion(options: argparse.Namespace) -> bool:
-    """Return whether a motion is given, or one of its members is the unknown."""
+    """Return whether the options describe a motion, or the unknown is a member of one."""
     return "." in options.unknown or any(getattr(options, name) is not None for name in PARTS)
 
 
@@ -82,5 +82,5 @@ def _unit_of_roots(solution: MotionSolution, typed: Sequence[str], digits: int |
 
 
 def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: MotionSolution) -> str:
-    """Return what was perhaps meant where a target is out of reach."""
+    """Return what was perhaps meant if a target is out of reach."""
     return common.other_meaning(options.target, options.ratio, case, solution.reach.holds)

@@ -1,4 +1,4 @@
-"""``mumacro stiffness``: k of a contact from materials and geometry."""
+"""Run ``mumacro stiffness``: print k of a contact from materials and geometry."""
 
 import argparse
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ from mumacro.stiffness import MATERIALS, NUMBERS, Material
 
 
 def _example(geometry: str) -> str:
-    """Return a command that answers."""
+    """Return an example of a command that gives a result."""
     names = (*GEOMETRIES[geometry].arguments, *BODIES[:2])
     options = (f"--{name} {ARGUMENTS[name].example}" for name in names)
     return " ".join(("mumacro stiffness", geometry, *options))
@@ -31,8 +31,8 @@ _NAMES = ", ".join(MATERIALS)
 
 
 def _of_materials(options: argparse.Namespace, arguments: Mapping[str, Any]) -> dict[str, float]:
-    """Return E and nu of the bodies whose material is named; raise UsageError where a number of
-    them is written, too."""
+    """Return E and nu of the bodies whose material is named.  Raise UsageError if the command also
+    has a number for one of them."""
     numbers: dict[str, float] = {}
     for suffix in ("", "2"):
         name = getattr(options, f"material{suffix}")
@@ -84,7 +84,7 @@ def run(words: Sequence[str]) -> str:
     contact = contact_of(options.geometry, **arguments)
     if options.json:
         return as_json({"geometry": options.geometry, **contact.to_dict()})
-    form = f".{options.digits or 4}g"  # what materials and geometry give at best
+    form = f".{options.digits or 4}g"  # materials and geometry give no more digits
     rows = [
         (name, f"{contact.columns[name]:{form}}", f"[{unit}]") for name, unit in NUMBERS.items()
     ]

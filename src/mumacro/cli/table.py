@@ -1,4 +1,4 @@
-"""``mumacro table``: the table in use and its errors."""
+"""Run ``mumacro table``: print the table in use and its errors."""
 
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
@@ -45,8 +45,8 @@ def run(words: Sequence[str]) -> str:
 
 
 def _errors(surrogate: Surrogate) -> Iterator[str]:
-    """Yield how the errors of the answers are distributed, and those of others' interpolation of
-    the plain grid, as text."""
+    """Yield lines of text: how the errors of the answers are distributed, and the errors of other
+    programs that interpolate the plain grid."""
     yield (
         "Errors that a share of the verified points does not exceed; then how many\n"
         "times the error its bound is: 1 or more is a bound that holds.\n"
@@ -60,7 +60,7 @@ def _errors(surrogate: Surrogate) -> Iterator[str]:
 
 
 def _by_share(errors: dict[str, dict[str, float]]) -> str:
-    """Return statistics by name in columns, shares of points as per cent."""
+    """Return statistics by name in columns, with fractions of points as per cent."""
     heads = [
         f"{100.0 * float(name):g} %" if name[0].isdigit() else name
         for name in next(iter(errors.values()))

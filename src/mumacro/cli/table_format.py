@@ -1,4 +1,4 @@
-"""The form of a table as text, in the options of the commands that take files."""
+"""Define the options for the layout of a table as text, for the commands that take files."""
 
 import argparse
 
@@ -8,7 +8,7 @@ from mumacro.inputs.numbers import THOUSANDS
 
 
 def add_format(parser: argparse.ArgumentParser) -> None:
-    """Add the options for the form of a table as text; :func:`dialect_in` reads them."""
+    """Add the options for the layout of a table as text; :func:`dialect_in` reads them."""
     for name, choices, text in (
         ("sep", SEPARATORS, "between the cells"),
         ("decimal", (".", ","), "in numbers"),
@@ -25,7 +25,7 @@ def add_format(parser: argparse.ArgumentParser) -> None:
 
 
 def _lines(text: str) -> tuple[int, int]:
-    """Return the numbers of two lines; argparse says the fault of another text."""
+    """Return the numbers of two lines; argparse reports a fault in another text."""
     first, dots, last = text.partition("..")
     if not (dots and first.isdecimal() and last.isdecimal() and 0 < int(first) <= int(last)):
         raise argparse.ArgumentTypeError(f"{text!r}: must be two numbers of lines, as 4..12")

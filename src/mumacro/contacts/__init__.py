@@ -1,1 +1,2 @@
-"""Contacts beside the table: stiffness from materials, a ball's quadrature, the time domain."""
+"""Model contacts without the table: stiffness from materials, the quadrature of a ball, the time
+domain."""

@@ -1,12 +1,12 @@
-"""The contact in the time domain: for programs with dynamics, soft drives, any motion of the upper
-point.
+"""Simulate the contact in the time domain: for programs with dynamics, soft drives, any motion of
+the upper point.
 
-A step is straight, and the normal force changes along it in proportion to the way; then the force
-after it has a closed form, eqs. (9) to (12): the spring sticks up to the limit mu0 Fz, and from
-there the angle psi between force and motion falls by tan(psi/2) -> tan(psi/2) exp(-k s/(mu0 Fz))
-over the path s.  So only a curved motion needs small steps.  A ball is many independent springs by
-the method of dimensionality reduction, with the limit 3/2 (1 - xi^2) of the mean one at xi = 0
-(middle) to 1 (rim).  The steps are those of the kernel, ``mumacro/kernel/element.c``; in C they are
+A step is a straight line, and the normal force changes along it linearly.  Then the force after the
+step has a closed form, eqs. (9) to (12): the spring sticks up to the limit mu0 Fz, and from there
+the angle psi between force and motion falls by tan(psi/2) -> tan(psi/2) exp(-k s/(mu0 Fz)) over the
+path s.  So only a curved motion needs small steps.  A ball is many independent springs by the
+method of dimensionality reduction.  Their limits are 3/2 (1 - xi^2) times the mean limit, with xi =
+0 (middle) to 1 (rim).  The kernel computes the steps, ``mumacro/kernel/element.c``; in C they are
 ``mumacro_element_step``.
 
 References
@@ -26,12 +26,12 @@ from mumacro.inputs.fields import Numbers, kind_of
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 
-SPRINGS, MOST_SPRINGS = 32, 100_000  # the springs of a ball: by default, and at most
+SPRINGS, MOST_SPRINGS = 32, 100_000  # number of springs of a ball: default and largest
 _KERNEL = kernels[-1]
 
 
 class Element:
-    """One contact or an array of them, moved step by step.
+    """Move one contact, or an array of contacts, step by step.
 
     Parameters
     ----------
@@ -40,27 +40,28 @@ class Element:
     Fz : array_like
         Normal force [N], > 0.
     k : array_like
-        Tangential stiffness of the contact [N/m], finite and > 0; of a ball that of full stick,
-        8 a G*.
+        Tangential stiffness of the contact [N/m], finite and > 0; for a ball the stiffness of full
+        stick, 8 a G*.
     contact : str
         "spring", or "ball" under a constant normal force.
     springs : int, optional
-        Springs of a ball, 32 if left out, up to 100,000.  The mean friction of 32 differs from the
-        ball's by at most 1.1e-3 mu0, at creeping speeds, by 1e-6 mu0 in the median; of 128 by
-        6.3e-5 and 7e-8.
+        Springs of a ball, 32 by default, up to 100,000.  The mean friction of 32 springs differs
+        from the ball's by at most 1.1e-3 mu0 (at very slow drag), by 1e-6 mu0 in the median; with
+        128 springs by 6.3e-5 and 7e-8.
 
     Raises
     ------
     InputError
-        A value out of bounds, shapes that do not broadcast, an unknown contact, more than one
-        spring for "spring".
+        If a value is out of bounds, shapes do not broadcast, the contact is unknown, or a "spring"
+        has more than one spring.
 
     Notes
     -----
-    Straight steps are exact.  The error of a curved motion falls with the square of its n steps a
-    period, and grows with the root of large amplitudes: mean forces are within max(6, 2 sqrt(y0
-    k/(mu0 Fz)))/n^2 of mu0 Fz at all of 4,000 random sines across (v~ from 0.03 to 30, amplitudes
-    to 3e4 mu0 Fz/k).  400 steps give 4e-5 up to an amplitude of 9 mu0 Fz/k, and 1.3e-4 at 100.
+    Straight steps are exact.  The error of a curved motion falls with the square of the number n of
+    steps in a period, and grows with the square root of large amplitudes.  Mean forces are within
+    max(6, 2 sqrt(y0 k/(mu0 Fz)))/n^2 of mu0 Fz for all of 4,000 random sines across (v~ from 0.03
+    to 30, amplitudes up to 3e4 mu0 Fz/k).  400 steps give 4e-5 up to an amplitude of 9 mu0 Fz/k,
+    and 1.3e-4 at 100.
 
     Examples
     --------
@@ -104,22 +105,22 @@ class Element:
         self._forces = np.zeros((self._k.size, springs, 2))
 
     def step(self, dx: Numbers, dy: Numbers, Fz: Numbers | None = None) -> tuple[Any, Any]:
-        """Move the upper point, and return the force that must be applied there to hold it.
+        """Move the upper point, and return the force that holds it there.
 
         Parameters
         ----------
         dx, dy : array_like
             The motion during this step [m], finite, of the contacts' shape or broadcast to it.
         Fz : array_like, optional
-            The normal force at the end of this step and until it is given again [N], finite and >=
-            0, reached in proportion to the way; at 0 the contact is open and its force zero.  For
-            one spring only: the radius of a ball would change with it.
+            The normal force at the end of this step [N], finite and >= 0; it keeps this value until
+            it is given again.  It changes linearly along the step.  At 0 the contact is open and
+            its force zero.  Only for one spring: the radius of a ball would change with it.
 
         Returns
         -------
         Fx, Fy : float, or ndarray of the contacts' shape
-            Force after the step [N]; Fx > 0 where the contact is dragged along x.  InputError moves
-            nothing.
+            Force after the step [N]; Fx > 0 if the contact is dragged along x.  If InputError is
+            raised, nothing has moved.
 
         Examples
         --------
@@ -146,13 +147,13 @@ class Element:
 
     @property
     def force(self) -> tuple[Any, Any]:
-        """Fx and Fy [N] as the last step returned them."""
+        """Return Fx and Fy [N] after the last step."""
         return self._pair(self._forces.sum(axis=1))
 
     @property
     def state(self) -> Array:
-        """Forces of the springs [N], a copy of shape ``(*contacts, springs, 2)``; may be
-        assigned."""
+        """Return the forces of the springs [N], a copy of shape ``(*contacts, springs, 2)``.  It
+        can be assigned."""
         return self._forces.reshape(*self.shape, self.springs, 2).copy()
 
     @state.setter
@@ -165,7 +166,7 @@ class Element:
         self._forces = array.reshape(self._forces.shape).copy()
 
     def reset(self) -> None:
-        """Relax all springs: no force."""
+        """Relax all springs, so that their forces are zero."""
         self._forces[...] = 0.0
 
     def __repr__(self) -> str:
@@ -189,7 +190,7 @@ class Element:
         return limit
 
     def _per_contact(self, value: Numbers, name: str) -> Array:
-        """Return ``value`` for every contact, (n,) and contiguous; finite."""
+        """Return ``value`` for every contact, finite, (n,) and contiguous."""
         if type(value) is float and math.isfinite(value):
             return np.full(self._k.size, value)
         numbers = real(name, value)

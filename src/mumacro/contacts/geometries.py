@@ -1,4 +1,4 @@
-"""The geometries of :mod:`mumacro.stiffness` by name, with arguments, units and meaning.
+"""List the geometries of :mod:`mumacro.stiffness` by name, with arguments, units and meaning.
 
 Command line, service and page derive their fields from :data:`GEOMETRIES` and :data:`ARGUMENTS`.
 """
@@ -24,8 +24,8 @@ from mumacro.stiffness import (
 
 
 class Argument(NamedTuple):
-    """One argument: SI unit, meaning, a value as a person writes it; its only values, for a
-    choice."""
+    """Describe one argument: SI unit, meaning, an example as a person writes it; for a choice its
+    only values."""
 
     unit: str
     meaning: str
@@ -34,8 +34,8 @@ class Argument(NamedTuple):
 
 
 class Geometry(NamedTuple):
-    """One geometry: its function, its meaning, and its own arguments beside those of the two
-    bodies."""
+    """Describe one geometry: its function, its meaning, and its own arguments (apart from those of
+    the two bodies)."""
 
     function: Callable[..., Contact]
     meaning: str
@@ -43,7 +43,7 @@ class Geometry(NamedTuple):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Every argument that it takes, also one in place of another."""
+        """Return the names of all arguments that it takes, including alternatives."""
         instead = (INSTEAD[name] for name in self.arguments if name in INSTEAD)
         return (*self.arguments, *instead, *BODIES)
 
@@ -67,7 +67,7 @@ ARGUMENTS = {
 }
 #: arguments of every geometry; the first two are required
 BODIES = ("E", "nu", "E2", "nu2")
-#: arguments of which one is given in place of the other
+#: pairs of arguments of which one replaces the other
 INSTEAD = {"radius": "diameter"}
 #: lengths that bodies usually have [m]
 _USUAL = 1e-6, 0.5
@@ -88,9 +88,9 @@ def contact_of(geometry: str, /, **arguments: Any) -> Contact:
     """Return the contact of one of :data:`GEOMETRIES`, from its arguments and those of the bodies
     in SI.
 
-    Its warnings, and remarks on lengths that bodies do not usually have, are in it.
-    InputError for an unknown geometry, and an argument that is missing,
-    unknown, no number or out of bounds.
+    Its notes have the warnings, and remarks on lengths that are unusual for a body.  Raise
+    InputError for an unknown geometry, and for an argument that is missing, unknown, not a number
+    or out of bounds.
 
     >>> contact_of("ball", radius=5e-3, Fz=10.0, E=210e9, nu=0.3).contact
     'ball'
@@ -131,7 +131,7 @@ def _contact(geometry: str, **arguments: Any) -> Contact:
 
 
 def _of_diameter(geometry: str, diameter: float, **arguments: Any) -> Contact:
-    """Return the contact of a ball, pin or cylinder whose diameter is given."""
+    """Return the contact of a ball, pin or cylinder from its diameter."""
     try:
         return _contact(geometry, radius=0.5 * diameter, **arguments)
     except InputError as error:
@@ -141,7 +141,7 @@ def _of_diameter(geometry: str, diameter: float, **arguments: Any) -> Contact:
 
 
 def doubts_of(arguments: Mapping[str, Any]) -> list[Note]:
-    """Return lengths of a geometry that bodies do not usually have, each with a question.
+    """Return a question for each length of a geometry that is unusual for a body.
 
     >>> [doubt.text for doubt in doubts_of({"radius": 5.0})]
     ['radius = 5 m: is it 5 mm? Usual is 1e-06 to 0.5 m']
@@ -159,7 +159,7 @@ def doubts_of(arguments: Mapping[str, Any]) -> list[Note]:
 
 
 def read_argument(name: str, text: str) -> Any:
-    """Return the value of an argument in SI from text; ``rigid`` is an infinite modulus.
+    """Return the value of an argument in SI from a text; ``rigid`` is an infinite modulus.
 
     >>> read_argument("E", "210 GPa"), read_argument("radius", "5mm"), read_argument("E2", "rigid")
     (210000000000.0, 0.005, inf)

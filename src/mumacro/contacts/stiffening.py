@@ -1,9 +1,9 @@
-"""The stiffness of a contact under a load that changes: k = k_given (Fz/Fz_given)^m.
+"""Compute the stiffness of a contact whose load changes: k = k_given (Fz/Fz_given)^m.
 
 The area of a contact grows with its load, and k with it: m = 1/3 for a ball (Hertz), 0.5 to 1 for
-rough surfaces, 0 for a flat punch.  It matters where Fz is swept or solved for.  Across and along
-only k/Fz counts, which goes like Fz^(m-1): the friction law over Fz keeps its course, stretched
-over ln Fz by 1/(1 - m), and for m = 1 it does not depend on Fz at all.
+rough surfaces, 0 for a flat punch.  This matters if Fz is swept or solved for.  Across and along
+only k/Fz counts, which is proportional to Fz^(m-1).  So the friction law over Fz keeps its shape
+and is stretched over ln Fz by 1/(1 - m).  For m = 1 it does not depend on Fz.
 """
 
 import math
@@ -22,22 +22,22 @@ from mumacro.kernel.arrays import Array
 EXPONENT = "stiffness_exponent"
 ROUGH = 0.5, 1.0  # exponents of rough surfaces (docs/how-to/stiffness.md)
 _BOUND = "one number from 0 to 1: 1/3 for a ball, 0.5 to 1 for rough surfaces, 0 for constant k"
-_FAR = 1e300  # stiffnesses and loads beyond it, or below its inverse, are not searched
+_FAR = 1e300  # larger stiffnesses and loads, or smaller ones than its inverse, are not searched
 
 
 class Stiffening(NamedTuple):
-    """k = k_given (Fz/load)^exponent."""
+    """Compute k = k_given (Fz/load)^exponent."""
 
     exponent: float  #: m, > 0 and <= 1
-    load: float  #: Fz_given [N], at which k_given holds
+    load: float  #: Fz_given [N], the load of k_given
 
     def stiffness(self, k: float, load: ArrayLike) -> Array:
-        """Return k [N/m] at loads [N], (n,), of a contact that has ``k`` at :attr:`load`;
-        InputError where it is no double > 0."""
+        """Return k [N/m] at loads [N], (n,), for a contact that has ``k`` at :attr:`load`.  Raise
+        InputError if the result is not a double > 0."""
         loads = np.asarray(load, dtype=np.float64)
         with np.errstate(over="ignore", under="ignore", invalid="ignore"):
             stiffnesses = np.asarray(k * (loads**self.exponent / self.load**self.exponent))
-        # a load that is out of bounds itself is refused by its own bound
+        # a load that is itself out of bounds is refused later, by its own check
         illegal = (
             (loads > 0.0) & (loads < math.inf) & ~((stiffnesses > 0.0) & (stiffnesses < math.inf))
         )
@@ -48,7 +48,7 @@ class Stiffening(NamedTuple):
         return stiffnesses
 
     def scaled(self, case: Mapping[str, Any], load: ArrayLike) -> dict[str, Array]:
-        """Return the stiffnesses of a case, k or the ends of its interval, at loads [N], (n,)."""
+        """Return the stiffnesses of a case at loads [N], (n,): k, or both ends of its interval."""
         if "k" not in case:
             stiffness = {name: read(name, case[name]).si for name in ENDS if name in case}
         elif (one := read("k", case["k"])).low is not None and one.high is not None:
@@ -58,13 +58,13 @@ class Stiffening(NamedTuple):
         return {name: self.stiffness(float(k), load) for name, k in stiffness.items()}
 
     def place(self, ratio: float) -> float:
-        """Return the load [N] at which k/Fz is ``ratio`` times what it is at :attr:`load`; for m <
+        """Return the load [N] at which k/Fz is ``ratio`` times its value at :attr:`load`; for m <
         1."""
         power = math.log(self.load) - math.log(ratio) / (1.0 - self.exponent)
         return math.exp(min(max(power, -690.0), 690.0))
 
     def range(self, k: float) -> tuple[float, float]:
-        """Return between which loads [N] both the load and k are far within double range."""
+        """Return the range of loads [N] in which both the load and k are well within double range."""
         log_k, log_far = math.log(k), math.log(_FAR)
         low, high = (
             math.log(self.load) + (side * log_far - log_k) / self.exponent for side in (-1.0, 1.0)
@@ -75,11 +75,12 @@ class Stiffening(NamedTuple):
 def stiffening_of(
     case: Mapping[str, Any], unknown: str, kind: Kind, exponent: float | None
 ) -> tuple[Mapping[str, Any], Stiffening | None]:
-    """Return how k grows where Fz is swept or solved for, and the case without the load at which k
-    holds.
+    """Return the case without the load at which k holds, and how k grows if Fz is swept or solved
+    for.
 
-    That load is the ``Fz`` of the case.  Without it k is constant, and an exponent > 0 is refused;
-    beside a spring without an exponent it is refused, too.  None where k is constant.
+    The load at which k holds is ``Fz`` of the case.  Without it k is constant, and an exponent > 0
+    is refused.  For a spring without an exponent this load is refused, too.  The second value is
+    None if k is constant.
     """
     if exponent is not None:
         power = read_one(EXPONENT, exponent)

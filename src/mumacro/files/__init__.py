@@ -1,8 +1,8 @@
-"""Files of cases, evaluated without a server: Parquet and tables as text, in constant memory.
-Needs pyarrow.
+"""Evaluate files of cases without a server: Parquet and tables as text, in constant memory.  It
+needs pyarrow.
 
-``answer`` takes one Arrow record batch and is all that other tools need; ``evaluate_files`` takes
-files.
+``answer`` evaluates one Arrow record batch and is all that other tools need; ``evaluate_files``
+evaluates files.
 """
 
 from mumacro.files.record_batch import ANSWERS, REJECTS, FilesError, answer

@@ -1,6 +1,7 @@
-"""One Arrow record batch of cases in, the same batch with results out, and a list of rejected rows.
+"""Evaluate one Arrow record batch of cases: return the same batch with results, and a list of
+rejected rows.
 
-Columns that are named like a missing input are refused.
+A column whose name resembles a missing input is refused.
 """
 
 import math
@@ -41,15 +42,16 @@ from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
 #: columns that are always added
 ANSWERS = DEFAULT
-#: of a row without a result: its index, the input (null: the row itself), the value, the reason
+#: for a row without a result: its index, the input (null if the fault is the row), the value, the
+#: reason
 REJECTS = pa.schema(
     [("row", pa.int64()), ("field", pa.string()), ("value", pa.string()), ("reason", pa.string())]
 )
 
 
 class FilesError(MumacroError):
-    """A file of cases cannot be read, understood or written; one line that names it, the reason and
-    the remedy."""
+    """Report a file of cases that cannot be read, understood or written, in one line with its name,
+    the reason and the remedy."""
 
 
 def answer_fields(names: Sequence[str] = ANSWERS) -> list[pa.Field]:
@@ -75,33 +77,34 @@ def answer(
     ----------
     batch : pyarrow.RecordBatch
         Columns ``mu0`` [-], ``Fz`` [N], ``k`` [N/m], ``y0`` [m], ``omega`` [rad/s] or ``f`` [Hz],
-        ``v0`` [m/s], with another unit where the heading has it in brackets; numbers or text.  An
-        infinite k, or the word ``rigid``, is a rigid contact.  A null, a NaN or an empty cell is
-        missing, in k as elsewhere.  ``k_low`` and ``k_high`` may stand for k; ``Fz_amplitude`` [N]
-        stands for y0 in direction normal.  ``contact`` and ``direction`` hold one
-        value each, ``std_k`` and so on standard deviations.  Other columns are copied unchanged.
+        ``v0`` [m/s]; the header may have another unit in brackets; numbers or text.  An infinite k,
+        or the word ``rigid``, is a rigid contact.  A null, a NaN or an empty cell is missing, also
+        in k.  ``k_low`` and ``k_high`` may replace k; ``Fz_amplitude`` [N] replaces y0 in direction
+        normal.  ``contact`` and ``direction`` hold one value each, ``std_k`` and so on standard
+        deviations.  Other columns are copied unchanged.
     surrogate : Surrogate, optional
-        Left out, the tightest table that comes with the library.
+        The tightest table that comes with the library by default.
     rigid : bool
-        All contacts are rigid and there is no column k.
+        Whether all contacts are rigid and there is no column k.
     include : sequence of str
-        Outputs beside mu_macro, as in :meth:`mumacro.Surrogate.evaluate`; their columns have the
-        paths as names: ``power.saved``.
+        More outputs, as in :meth:`mumacro.Surrogate.evaluate`; their columns have the paths as
+        names: ``power.saved``.
     contact, direction : str
-        Of all cases, as in :meth:`mumacro.Surrogate.evaluate`, where there is no column of them.
+        Contact and direction of all cases, as in :meth:`mumacro.Surrogate.evaluate`, if there is no
+        column of them.
 
     Returns
     -------
     batch : pyarrow.RecordBatch
-        As many rows in the same order, with mu_macro (for an interval of k also mu_macro_low and
-        mu_macro_high), mu_ratio, regime, error_bound and source; null where a case has no result.
+        The same rows in the same order, with mu_macro (for an interval of k also mu_macro_low and
+        mu_macro_high), mu_ratio, regime, error_bound and source; null if a case has no result.
     rejects : pyarrow.RecordBatch
-        One row of ``REJECTS`` for each of those.
+        One row of ``REJECTS`` for each case without a result.
 
     Raises
     ------
     FilesError
-        A column is missing, has a wrong name or no numbers.
+        If a column is missing, has a wrong name or no numbers.
 
     Examples
     --------
@@ -126,22 +129,22 @@ def answer(
 
 
 class Columns(NamedTuple):
-    """Which columns of a table of cases mean what, and what answers are written beside them."""
+    """Tell the meaning of the columns of a table of cases, and which answers are added."""
 
-    #: by input, or ``std_k`` and so on: the heading, and the scale of its unit
+    #: by input, or ``std_k`` and so on: the header, and the scale of its unit
     headings: dict[str, tuple[str, Scale]]
-    words: list[str]  #: the columns of contacts and directions that there are
+    words: list[str]  #: the columns of contact and direction, if the table has them
     kind: Kind
     include: tuple[str, ...]
     answer_names: list[str]  #: names of the columns with answers
 
 
 class AnswerColumns(NamedTuple):
-    """What :func:`answer_columns` gives."""
+    """Hold the result of :func:`answer_columns`."""
 
     columns: list[pa.Array]
     rejects: list[tuple[int, str, str]]  #: index, input and reason of each row without a result
-    inputs: dict[str, Array]  #: the inputs in the units of the table, by heading
+    inputs: dict[str, Array]  #: the inputs in the units of the table, by header
     notes: list[Note]
 
 
@@ -153,12 +156,12 @@ def find_columns(
     where: str = "",
     units: Mapping[str, str] | None = None,
 ) -> Columns:
-    """Return what the columns of these names mean, and the names of those with answers; ``units``
-    are those that fields say, by column.
+    """Return the meaning of the columns of these names, and the names of the columns with answers.
+    ``units`` are the units in the metadata of fields, by column.
 
-    FilesError names, after ``where``, all columns that stand twice in the heading, would be written
-    twice, have an unknown unit, or are missing; for a missing one it lists the columns of the file,
-    or names a similar one.
+    Raise FilesError for all columns that occur twice in the header, would be written twice, have an
+    unknown unit, or are missing; the message begins with ``where``.  For a missing one it lists the
+    columns of the file, or names a similar one.
 
     >>> find_columns(["mu0", "Fz [kN]", "k", "y0", "f", "v0", "note"]).headings["Fz"]
     ('Fz [kN]', Scale(times=1000.0, over=1.0))
@@ -211,15 +214,15 @@ def find_columns(
 
 
 def _with_unit(name: str, unit: str | None) -> str:
-    """Return a head with the unit of its field, where it has none."""
+    """Return a header with the unit of its field, if the header has none."""
     return f"{name} [{unit}]" if unit and split_unit(name)[1] is None else name
 
 
 def kind_of_batch(batch: pa.RecordBatch, kind: Kind, where: str = "") -> Kind:
-    """Return the contact and the direction of a batch: those of its columns, else ``kind``.
+    """Return the contact and the direction of a batch: those of its columns, otherwise ``kind``.
 
-    Raise FilesError, after ``where``, for a column with several values, with an unknown one, or
-    beside an option.
+    Raise FilesError for a column with several values or an unknown one, or if an option says the
+    same; the message begins with ``where``.
     """
     words = dict(kind.names)
     for name in KIND:
@@ -246,7 +249,7 @@ def kind_of_batch(batch: pa.RecordBatch, kind: Kind, where: str = "") -> Kind:
 
 
 def names_of_columns(rigid: bool = False) -> ColumnNames:
-    """Return the columns that a table of cases may have, and those that it needs."""
+    """Return the columns that a table of cases may have, and the ones that it needs."""
     names = [*SI, *MEASURED_AS]
     quantities = {name: MEASURED_AS.get(name, name) for name in names}
     quantities |= {f"std_{name}": quantity for name, quantity in quantities.items()}
@@ -256,8 +259,8 @@ def names_of_columns(rigid: bool = False) -> ColumnNames:
 
 
 def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
-    """Yield the faults of columns that are missing, as parts of one sentence: the last, on k, goes
-    on with what is said of the columns before it."""
+    """Yield the faults of missing columns as parts of one sentence.  The last part, about k,
+    continues what is said about the columns before it."""
     if "y0" in inputs and AMPLITUDE in (split_unit(column)[0] for column in names):
         yield f"there is no column y0, but {AMPLITUDE}: give --direction normal"
         inputs = [name for name in inputs if name != "y0"]
@@ -270,9 +273,9 @@ def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
 def answer_columns(
     batch: pa.RecordBatch, surrogate: Surrogate, columns: Columns, signs: Signs | None = None
 ) -> AnswerColumns:
-    """Return the answers to a batch; ``signs`` are those of numbers as text.
+    """Return the answers to a batch; ``signs`` are the separators in numbers as text.
 
-    Raise FilesError where it has another contact or direction than the batches before it.
+    Raise FilesError if it has another contact or direction than the batches before it.
     """
     if columns.words and (kind := kind_of_batch(batch, SPRING)) != columns.kind:
         kinds = " and ".join(", ".join(one.names.values()) for one in (columns.kind, kind))
@@ -300,7 +303,7 @@ def answer_columns(
     for path in columns.answer_names:
         if path not in TEXTS:
             column = result[path]
-            # what there is not is null
+            # an output that does not exist is null
             absent = np.isnan(column) if path in result.outputs else mask
             arrays[path] = pa.array(column, mask=absent)
     rejects = []
@@ -323,10 +326,10 @@ def _dictionary(codes: Codes, words: Sequence[str], mask: Bools | None) -> pa.Ar
 def numbers(
     array: pa.Array, name: str, signs: Signs, scale: Scale
 ) -> tuple[Array, Array, dict[int, str]]:
-    """Return a column of the input ``name`` as doubles (n,) in its own unit and in SI, NaN where a
-    cell has no number, and what is wrong with it.
+    """Return three values for a column of the input ``name``: its doubles (n,) in its own unit, the
+    same in SI (NaN where a cell has no number), and the faults of cells by row.
 
-    FilesError where the column is of another type than numbers or text.
+    Raise FilesError if the column's type is neither a number nor text.
     """
     if pa.types.is_dictionary(array.type):
         array = array.dictionary_decode()
@@ -355,7 +358,7 @@ def numbers(
 
 
 def _field_and_reason(error: InputError) -> tuple[str, str]:
-    """Return the input of a row that has no result, and why."""
+    """Return the input that is at fault in a row without a result, and the reason."""
     name, value = error.field, error.value
     number = float(value)  # type: ignore[arg-type]  # a number of the row
     if math.isnan(number):

@@ -1,4 +1,4 @@
-"""A run over files of cases.  The output appears whole or not at all."""
+"""Evaluate files of cases in one run.  The output appears complete or not at all."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -32,8 +32,8 @@ from mumacro.table.atomic import growing, to_disk
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run did: rows read, answered and rejected; the files (``rejects`` is None without
-    any); what is doubtful."""
+    """Tell what a run did: rows read, answered and rejected; the files (``rejects`` is None if
+    there are no rejects); remarks."""
 
     rows: int
     answered: int
@@ -59,32 +59,33 @@ def evaluate_files(
 ) -> Summary:
     """Evaluate every case of some files.
 
-    A run that fails or is interrupted leaves an older output as it is, and no other file.
+    A run that fails or is interrupted leaves an older output unchanged, and no other file.
 
     Parameters
     ----------
     cases : sequence of path
         Files, folders or patterns; all of one format.
     out : path
-        Its ending sets the format.  Rows keep their order; a rejected row is not in it, but in
-        ``OUT.rejects.csv``.
+        Its file extension sets the format.  Rows keep their order; a rejected row is not in it but
+        in ``OUT.rejects.csv``.
     surrogate : Surrogate
     rigid, include, contact, direction
         As in :func:`mumacro.files.answer`.
     dialect : mumacro.inputs.layout.Dialect
-        How tables as text are written, as far as it is known; the rest is found in the files.  A
-        separator and a decimal sign hold for an output as text, too.
+        How tables as text are written, if it is known; the rest is found from the files.  A
+        separator and a decimal separator also hold for an output as text.
     force : bool
-        Replace an output that exists.
+        Whether to replace an output that exists.
     progress, say : callable
-        Called with the finished share, rows read and rejected; with one line about how a table
-        as text is read, and which files of a folder are left out.
+        ``progress`` is called with the finished fraction, rows read and rows rejected.  ``say`` is
+        called with one line about how a table as text is read, and which files of a folder are left
+        out.
 
     Raises
     ------
     FilesError
-        An input or output that cannot be used, or an input that changed meanwhile; names it, with
-        the remedy.
+        If an input or output cannot be used, or an input changed during the run; the message names
+        it, with the remedy.
 
     Examples
     --------
@@ -101,13 +102,13 @@ def evaluate_files(
         return run.evaluate(force, progress)
     except (
         pa.ArrowException
-    ) as error:  # no Parquet, or columns that are unlike or of a type that text cannot hold
+    ) as error:  # no Parquet, or columns that differ or have a type that text cannot hold
         raise FilesError(f"{cases[0]}: {error}") from None
 
 
 class _State(NamedTuple):
-    """How far the run is after a piece: the file, all rows and the rejected ones; the piece's
-    rejects as CSV."""
+    """Hold the progress of the run after a piece: the file, all rows and the rejected ones, the
+    piece's rejects as CSV."""
 
     file: int = 0
     rows: int = 0
@@ -138,7 +139,7 @@ class _Run:
                     f"{output}: is an input, and would be overwritten; give another -o"
                 )
         self.states_at_start = [_state_of(path) for path in self.files]
-        #: rows of a text come out as they came in, with the answers behind them
+        #: rows of a text are written as they were read, with the answers after them
         self.keeps_lines = input_format == output_format == "text"
         folder = str(cases[0]) if len(cases) == 1 and Path(cases[0]).is_dir() else None
         self.source = (
@@ -171,12 +172,12 @@ class _Run:
         self.schema = pa.schema(fields, self.source.schema.metadata)
 
     def evaluate(self, force: bool, progress: Callable[[float, int, int], None]) -> Summary:
-        """Evaluate piece by piece, and put the files into place."""
+        """Evaluate piece by piece, and move the files to their places."""
         for path in (self.out, self.rejects):
             if path.exists() and not force:
                 raise FilesError(f"{path}: exists already; --force replaces it")
         state, rejects = _State(), None
-        with ExitStack() as files:  # which puts the rejects into place before the output
+        with ExitStack() as files:  # the rejects are moved to their place before the output
             stream = files.enter_context(growing(self.out))
             try:
                 with self.output.writing(stream, self.schema) as write:
@@ -187,9 +188,9 @@ class _Run:
                             rejects.write(state.rejects.encode("utf-8", "surrogateescape"))
                         progress(share, state.rows, state.rejected)
             except (FilesError, pa.ArrowException):
-                self._refuse_changed()  # first: a half-written input looks damaged
+                self._refuse_changed()  # first, because a half-written input looks damaged
                 raise
-            to_disk(stream)  # which a full disk refuses, before the rejects are in place
+            to_disk(stream)  # a full disk refuses this, before the rejects are in place
         if not state.rejected:
             self.rejects.unlink(missing_ok=True)
         return Summary(
@@ -209,8 +210,8 @@ class _Run:
         return stream
 
     def _new_pieces(self) -> Iterator[tuple[_State, Any, float]]:
-        """Yield the pieces of the output, with the state after each and the share of the input that
-        is read; the head comes first."""
+        """Yield the pieces of the output, with the state after each and the fraction of the input
+        that was read.  The header comes first."""
         state = _State()
         if self.output.format == "text":
             headings = [*(self.source.schema.names if self.keeps_lines else ()), *self.schema.names]
@@ -233,7 +234,7 @@ class _Run:
                 ) from None
 
     def _piece(self, state: _State, block: RowBlock) -> tuple[_State, Any]:
-        """Return a block as it stands in the output, and the state after it."""
+        """Return a block as the output has it, and the state after it."""
         answers, rejects, inputs, notes = answer_columns(
             block.batch, self.surrogate, self.columns, block.signs
         )
@@ -265,6 +266,6 @@ class _Run:
 
 
 def _state_of(path: Path) -> tuple[int, ...]:
-    """Return what shows whether a file has changed."""
+    """Return values that change when a file changes."""
     is_now = path.stat()
     return is_now.st_ino, is_now.st_size, is_now.st_mtime_ns

@@ -1,6 +1,6 @@
-"""Files of cases: which there are, their columns, and their rows in blocks.
+"""Find files of cases, and read their columns and their rows in blocks.
 
-A table as text is cut into rows by :class:`mumacro.inputs.text_tables.TextTable`; Arrow reads their
+:class:`mumacro.inputs.text_tables.TextTable` cuts a table as text into rows.  Arrow reads the
 cells: inputs as numbers, other columns as text.
 """
 
@@ -25,28 +25,28 @@ from mumacro.inputs.numbers import Signs
 from mumacro.inputs.text_tables import Rows, TextTable
 from mumacro.kernel.arrays import Places
 
-#: endings of files that are written, and their format
+#: extensions of files that can be written, and their format
 WRITTEN = {
     ".csv": "text",
     ".tsv": "text",
     ".txt": "text",
     ".parquet": "parquet",
 }
-#: endings of files that are read, and their format
+#: extensions of files that can be read, and their format
 FORMATS = WRITTEN | dict.fromkeys((".lvm", ".dat", ".asc", ".prn", ".xlsx"), "text")
 ENDINGS = f"{', '.join(WRITTEN)} (text also .gz)"
-# endings that only tables have; a text with another ending may be a note beside them
+# extensions that only tables have; a text with another extension may be a note
 _TABLES = {".csv", ".tsv", ".parquet"}
-#: endings of files with a JSON object a line, which are refused
+#: extensions of files with one JSON object per line, which are refused
 _JSON = {".ndjson", ".jsonl", ".json"}
-# what begins the names of files that others leave in a folder: metadata, hidden files, Excel's lock
+# first letters of files that other programs leave in a folder: metadata, hidden files, Excel's lock
 _STRAY = ("_", ".", "~$")
 ROWS = 65_536  # rows of a block of Parquet, at most: a third of a second of work
 _NULLS = sorted({text for gap in GAPS for text in (gap, gap.upper(), gap.title())} | {"NaN"})
 
 
 def format_of(path: Path, formats: Mapping[str, str] = WRITTEN) -> tuple[str, bool]:
-    """Return the format by a name's ending, empty for another ending, and whether it is
+    """Return the format by the extension of a name (empty for another extension), and whether it is
     compressed."""
     name = path.name.lower()
     is_compressed = name.endswith(".gz")
@@ -55,7 +55,7 @@ def format_of(path: Path, formats: Mapping[str, str] = WRITTEN) -> tuple[str, bo
 
 
 def ending_of(path: Path) -> str:
-    """Return the ending of a name, before that of a compressed file.
+    """Return the extension of a name; for a compressed file the one before that of compression.
 
     >>> ending_of(Path("cases.CSV.gz"))
     '.csv'
@@ -68,8 +68,9 @@ def find_files(
 ) -> tuple[list[Path], str]:
     """Return the files that paths, folders and patterns name, in order, and their format.
 
-    A file that is named itself is a table as text where its ending tells nothing.  What others
-    leave in a folder is skipped, and said.  FilesError where one names no file, or formats differ.
+    A file that the caller names itself is read as text if its extension is unknown.  Files of other
+    programs in a folder are skipped, and ``say`` is told so.  Raise FilesError if a name fits no
+    file, or if formats differ.
     """
     files: list[Path] = []
     formats: dict[str, None] = {}
@@ -99,7 +100,7 @@ def find_files(
 
 
 def _tables_among(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
-    """Return the files of a folder that are tables of cases, and the others."""
+    """Return the files of a folder that are tables of cases, and the other files."""
     usable = [
         path
         for path in paths
@@ -112,18 +113,20 @@ def _tables_among(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
 
 
 class RowBlock(NamedTuple):
-    """Some rows in order."""
+    """Hold some rows in order."""
 
-    batch: pa.RecordBatch  #: of a row that could not be read, nulls
-    share: float  #: of the file that is read after them
-    lines: Sequence[int] | Places  #: of the file, or numbers of rows from 1 where it has none
-    faults: Mapping[int, tuple[str, str]] = {}  #: by index, the text of such a row, and why
-    signs: Signs | None = None  #: of numbers as text
-    rows: Rows | None = None  #: of a table as text, and the heads of their cells
+    batch: pa.RecordBatch  #: the rows; nulls in a row that could not be read
+    share: float  #: fraction of the file that is read after them
+    #: line numbers in the file, or row numbers from 1 if it has no lines
+    lines: Sequence[int] | Places
+    #: by index: the text of a row that could not be read, and the reason
+    faults: Mapping[int, tuple[str, str]] = {}
+    signs: Signs | None = None  #: the separators in numbers as text
+    rows: Rows | None = None  #: rows of a table as text, with the header of their cells
     heads: Sequence[str] = ()
 
     def value(self, i: int, name: str) -> str | None:
-        """Return a cell as it stands in the file."""
+        """Return a cell as it is in the file."""
         if self.rows is not None:
             return self.rows.of(i)[self.heads.index(name)]
         cell = self.batch.column(name)[i].as_py()
@@ -131,7 +134,7 @@ class RowBlock(NamedTuple):
 
 
 class ParquetSource:
-    """Parquet; folders below ``folder`` that are named ``key=value`` give columns, as in Hive."""
+    """Read Parquet; folders below ``folder`` that are named ``key=value`` give columns, as in Hive."""
 
     has_mark, sep, decimal = False, "", "."
 
@@ -149,7 +152,7 @@ class ParquetSource:
         self.where = f"{files[0]}: "
 
     def blocks(self, file: int, names: Sequence[str]) -> Iterator[RowBlock]:
-        """Yield the rows of a file in blocks, of the columns ``names``."""
+        """Yield the rows of a file in blocks, with the columns ``names``."""
         part, row = self.parts[file], 0
         scan = pa.dataset.ParquetFragmentScanOptions(pre_buffer=False)
         options = {
@@ -168,7 +171,7 @@ class ParquetSource:
 
 
 class TextSource:
-    """Tables as text, whose heads name the same columns; FilesError where one does not."""
+    """Read tables as text whose headers name the same columns.  Raise FilesError if one does not."""
 
     def __init__(
         self, files: Sequence[Path], dialect: Dialect, column_names: ColumnNames, to_text: bool
@@ -188,7 +191,7 @@ class TextSource:
                     f"{path}: its decimal separator differs from that of {files[0]}; give the "
                     "files one by one, or write Parquet"
                 )
-        # Excel reads the signs of UTF-8 where it begins with a mark
+        # Excel reads UTF-8 correctly if it begins with a byte-order mark
         self.has_mark = self.layout.encoding != "utf-8"
         self.where = f"{files[0]}: line {self.layout.line}: "
         self.sep = self.tables[0].account.sep
@@ -196,16 +199,16 @@ class TextSource:
 
     @property
     def layout(self) -> Layout:
-        """How the first table is written."""
+        """Return how the first table is written."""
         return self.tables[0].layout
 
     @property
     def decimal(self) -> str:
-        """The decimal sign of the first table."""
+        """Return the decimal separator of the first table."""
         return self.tables[0].signs.decimal or "."
 
     def describe(self, say: Callable[[str], None]) -> None:
-        """Say how the files were read, once where all are alike, and what was left out."""
+        """Say how the files were read (once if all are alike), and what was left out."""
         by_form: dict[str, list[str]] = {}
         for path, table in zip(self.files, self.tables, strict=True):
             by_form.setdefault(table.read_as, []).append(path.name)
@@ -214,8 +217,8 @@ class TextSource:
             say(f"{where}read as: {form}")
 
     def blocks(self, file: int, names: Sequence[str]) -> Iterator[RowBlock]:
-        """Yield the rows of a file in blocks, of the columns ``names``: inputs are numbers where
-        all of a block are plain ones."""
+        """Yield the rows of a file in blocks, with the columns ``names``.  An input is a column of
+        numbers if all its cells in the block are plain numbers."""
         path, table = self.files[file], self.tables[file]
         size, place = max(path.stat().st_size, 1), 0
 
@@ -234,14 +237,14 @@ class TextSource:
 
 
 def _columns(rows: Rows, table: TextTable, names: Sequence[str]) -> list[pa.Array]:
-    """Return the columns of rows: inputs as numbers, or as text where a cell is no plain number."""
+    """Return the columns of rows: inputs as numbers, or as text if a cell is not a plain number."""
     places = {head: str(i) for i, head in enumerate(table.layout.heads)}
     as_text = dict.fromkeys((places[name] for name in names), pa.string())
     inputs = {str(i) for i in table.layout.inputs}.intersection(as_text)
     try:
         types = as_text | dict.fromkeys(inputs, pa.float64())
         columns = _read(rows, len(places), types, table.signs.decimal or ".")
-        # too many digits must not pass for a rigid contact
+        # a number with too many digits must not become a rigid contact
         if not any(pc.any(pc.is_inf(columns[i])).as_py() for i in inputs):
             return [columns[places[name]] for name in names]
     except pa.ArrowInvalid:
@@ -281,8 +284,8 @@ def _read(
 
 
 def lines_of(rows: Rows, sep: str) -> pa.Array:
-    """Return rows as they stand in the file, as an array of texts; with another separator, with
-    their cells in quotes where they need them."""
+    """Return rows as they are in the file, as an array of texts.  With another separator, put cells
+    in quotes where they need it."""
     if sep != rows.sep:
         return pa.array([joined(cells, sep) for cells in rows.cells()], pa.string())
     count = rows.ends.size

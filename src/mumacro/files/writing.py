@@ -1,4 +1,4 @@
-"""Evaluated batches as pieces of a file: tables as text, or Parquet."""
+"""Write evaluated batches as pieces of a file: tables as text, or Parquet."""
 
 import gzip
 import json
@@ -21,8 +21,8 @@ def csv_lines(rows: Iterable[Iterable[object]], sep: str = ",") -> str:
 
 
 def written_as(ending: str, sep: str, decimal: str, dialect: Dialect) -> tuple[str, str]:
-    """Return the separator and the decimal sign of an output as text: those that are given, else
-    those of the input, ``sep`` and ``decimal``, where the ending fits."""
+    """Return the separator and the decimal separator of an output as text: the ones in ``dialect``,
+    otherwise those of the input, ``sep`` and ``decimal``, if the extension fits."""
     sep, decimal = dialect.sep or sep, dialect.decimal or decimal
     if ending == ".tsv" or sep == BLANKS or (ending == ".txt" and not sep):
         sep = "\t"
@@ -32,10 +32,11 @@ def written_as(ending: str, sep: str, decimal: str, dialect: Dialect) -> tuple[s
 
 
 class OutputFormat(NamedTuple):
-    """How rows are written: ``text`` or ``parquet``; text piece by piece, ``is_compressed`` as .gz.
+    """Describe how rows are written: ``text`` or ``parquet``; text piece by piece, as .gz if
+    ``is_compressed``.
 
-    ``sep`` and ``decimal`` are those of a table as text; in the column ``stiffness`` infinity is
-    written as ``rigid``.
+    ``sep`` and ``decimal`` are the separators of a table as text.  In the column ``stiffness``
+    infinity is written as ``rigid``.
     """
 
     format: str
@@ -45,14 +46,14 @@ class OutputFormat(NamedTuple):
     stiffness: str | None
 
     def pack(self, text: str) -> bytes:
-        """Return a piece of text as it is in the file."""
+        """Return a piece of text as the file has it."""
         data = text.encode("utf-8", "surrogateescape")
         # without name and time, so that the same text gives the same bytes
         return gzip.compress(data, 6, mtime=0) if self.is_compressed else data
 
     def piece(self, batch: pa.RecordBatch, lines: pa.Array | None = None) -> Any:
-        """Return rows as they are written, for Parquet the batch itself; the columns stand behind
-        ``lines``, where there are some."""
+        """Return rows as they are written; for Parquet the batch itself.  The columns are written
+        after ``lines``, if there are any."""
         if self.format == "parquet":
             return batch
         columns = [*map(self._cells, batch.schema.names, batch.columns)]
@@ -62,7 +63,7 @@ class OutputFormat(NamedTuple):
         return self.pack("".join(rows.to_pylist()))
 
     def _cells(self, name: str, column: pa.Array) -> pa.Array:
-        """Return a column as cells of text, empty ones where it is null."""
+        """Return a column as cells of text; a null is an empty cell."""
         if pa.types.is_dictionary(column.type):
             column = column.dictionary_decode()
         if pa.types.is_nested(column.type):
@@ -87,8 +88,8 @@ class OutputFormat(NamedTuple):
 
     @contextmanager
     def writing(self, stream: BinaryIO, schema: pa.Schema) -> Iterator[Callable[[Any], object]]:
-        """Yield what writes a piece; doubles in Parquet are written plainly, which is three times
-        as fast."""
+        """Yield the function that writes a piece.  Doubles in Parquet are written plainly, which is
+        three times as fast."""
         if self.format != "parquet":
             yield stream.write
             return

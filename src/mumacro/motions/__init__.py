@@ -1,1 +1,2 @@
-"""Any periodic motion of a contact: its mean friction, the motion that gives one, samples."""
+"""Compute any periodic motion of a contact: its mean friction, the motion that gives a wanted
+friction, and samples as harmonics."""

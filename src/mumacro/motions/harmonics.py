@@ -1,5 +1,4 @@
-"""Samples of an oscillation, such as those of a sensor, as the harmonics that a motion is made
-of."""
+"""Convert samples of an oscillation, such as those of a sensor, to the harmonics of a motion."""
 
 import math
 from dataclasses import dataclass, field
@@ -17,28 +16,30 @@ from mumacro.motions.oscillation import MOST_HARMONIC
 from mumacro.notes import NOTE, Note, texts_of
 from mumacro.results import Result
 
-# shares of the largest sample: what rounding alone leaves of a term, and between equal samples
+# Relative to the largest sample: the rounding error of a term, and of the difference between equal
+# samples.
 _NOTHING, _SAME = 8.0 * 2.0**-52, 1e-9
-# A symmetric oscillation may begin and end with the same value and repeat nothing: then it leaves
-# out this much less than without its last sample.
+# A symmetric oscillation may begin and end with the same value although no sample is repeated.
+# Then the residual with all samples is smaller than this fraction of the residual without the last
+# one.
 _CLEARLY = 1e-3
 _REPEATED = "the last sample repeats the first, which begins the next period: it is left out"
 
 
 @dataclass(frozen=True, repr=False)
 class Harmonics(Result):
-    """The harmonics of an oscillation, in the unit of its samples."""
+    """Hold the harmonics of an oscillation, in the unit of its samples."""
 
     #: (harmonic, amplitude, phase in degrees): amplitude sin(harmonic omega t + phase), with t = 0
-    #: at the first sample; without those that are 0
+    #: at the first sample; harmonics that are 0 are left out
     terms: tuple[tuple[int, float, float], ...]
-    mean: float  #: of the samples
-    rms: float  #: of what the mean and the terms leave out
-    notes: tuple[Note, ...] = field()  #: what was done to the samples
+    mean: float  #: mean of the samples
+    rms: float  #: root mean square of the rest after mean and terms
+    notes: tuple[Note, ...] = field()  #: what was changed in the samples
 
     @property
     def columns(self) -> dict[str, Any]:
-        """The terms as columns: harmonic, amplitude, phase."""
+        """Return the terms as columns: harmonic, amplitude, phase."""
         numbers, amplitudes, phases = zip(*self.terms, strict=True) if self.terms else ((), (), ())
         return {
             "harmonic": np.array(numbers, np.int64),
@@ -47,9 +48,9 @@ class Harmonics(Result):
         }
 
     def plot(self, ax: Any = None) -> Any:
-        """Return the amplitude of each harmonic, and the root mean square of what they leave out.
+        """Draw the amplitude of each harmonic, and the root mean square of the rest.
 
-        ``ax`` are axes of matplotlib, or new ones; they are returned.
+        ``ax`` are matplotlib axes, or None for new ones.  They are returned.
         """
         columns = self.columns
         title = f"mean {self.mean:.6g}, rms of what is left out {self.rms:.3g}"
@@ -58,7 +59,7 @@ class Harmonics(Result):
         )
 
     def _members(self) -> dict[str, Any]:
-        """Return the terms as dicts, as HTTP takes them, and what they leave out."""
+        """Return the terms as dicts, as HTTP takes them, and the root mean square of the rest."""
         names = ("harmonic", "amplitude", "phase")
         terms = [dict(zip(names, term, strict=True)) for term in self.terms]
         return {
@@ -81,24 +82,23 @@ def harmonics(samples: Numbers, periods: int = 1, most: int = 20) -> Harmonics:
     Parameters
     ----------
     samples : array_like
-        Values at equal steps of time over whole periods, shape (n,): of x or y [m], or of the
-        normal force [N], whose mean is Fz.  A last sample that repeats the first is left out, with
-        a note.
+        Values at equal time steps over whole periods, shape (n,): of x or y [m], or of the normal
+        force [N], whose mean is Fz.  A last sample that repeats the first is left out, with a note.
     periods : int
-        How many periods they are.
+        Number of periods.
     most : int
         The largest harmonic, less than half of the samples of a period.
 
     Returns
     -------
     Harmonics
-        ``terms`` for ``motion``, ``mean``, and ``rms``, the root mean square of what both leave
-        out: harmonics above ``most``, noise, and what differs from period to period.
+        ``terms`` for ``motion``, ``mean``, and ``rms``, the root mean square of the rest: harmonics
+        above ``most``, noise, and differences between the periods.
 
     Raises
     ------
     InputError
-        A sample that is no finite number; too few samples for the harmonics.
+        If a sample is not a finite number, or there are too few samples for the harmonics.
 
     Examples
     --------
@@ -139,7 +139,7 @@ def harmonics(samples: Numbers, periods: int = 1, most: int = 20) -> Harmonics:
 
 
 def _samples(samples: Any) -> Array:
-    """Return finite numbers, (n,), n >= 3, in SI."""
+    """Return the samples as finite numbers in SI, (n,), n >= 3."""
     has_unit = carried_unit(samples) is not None
     values = np.asarray(_in_si(samples) if has_unit else to_si("samples", samples))
     if values.ndim != 1 or values.size < 3:
@@ -152,7 +152,7 @@ def _samples(samples: Any) -> Array:
 
 
 def _in_si(samples: Any) -> Any:
-    """Return samples that carry a unit, of a length or of a force."""
+    """Return samples with a unit of length or of force in SI."""
     try:
         return to_si("samples", samples, "length")
     except InputError:
@@ -160,7 +160,7 @@ def _in_si(samples: Any) -> Any:
 
 
 def _spectrum(scaled: Array, scale: float, periods: int, most: int) -> Harmonics:
-    """Return the harmonics of samples in units of ``scale`` that repeat nothing."""
+    """Return the harmonics of samples in units of ``scale``, without a repeated sample."""
     mean = float(scaled.mean())
     spectrum = np.fft.rfft(scaled - mean) / scaled.size
     orders = np.arange(1, most + 1)

@@ -1,9 +1,9 @@
-"""Any periodic motion of the contact: oblique, elliptic, with harmonics, beside a load that
-oscillates, too.
+"""Compute any periodic motion of the contact: oblique, elliptic, with harmonics, also together with
+an oscillating load.
 
-No table holds these.  The steady cycle is computed from the equations of the contact, those of
-:class:`mumacro.Element`, in ``kernel/motion*.c``: a method of order 5 follows slip to its end, and
-the cycle is the fixed point of the map of a period.
+No table holds these motions.  The steady cycle is computed from the equations of the contact, the
+same as those of :class:`mumacro.Element`, in ``kernel/motion*.c``.  A method of order 5 follows
+slip to its end, and the cycle is the fixed point of the map of a period.
 """
 
 import math
@@ -28,13 +28,13 @@ from mumacro.results import Result, Rows, cell
 from mumacro.stopping import current, look
 
 TOLERANCES = 1e-9, 1e-2
-# the longest and the shortest way in a radian, in units of mu0 Fz / k; below the last, rounding
-# decides in which direction the drag pulls
+# the largest and the smallest displacement in a radian, in units of mu0 Fz / k; below the smallest
+# one, rounding decides in which direction the drag pulls
 FURTHEST, SLOWEST = 1e9, 1e-9
-REMAINING = 0.01  # the share of a disturbance that is left after ``periods``
+REMAINING = 0.01  # the fraction of a disturbance that is left after ``periods``
 PARTS = ("x", "y", "normal")
-_SPRINGS = 64  # the springs of a ball in a picture
-_AT_ONCE = 16, 1  # cases that a thread takes at a time: springs, balls
+_SPRINGS = 64  # number of springs of a ball in a picture
+_AT_ONCE = 16, 1  # number of cases that a thread takes at a time: springs, balls
 _KERNEL = kernels[-1]
 _LIFTS_OFF = "an oscillation that leaves a load > 0 at every moment: at 0 the contact lifts off"
 _STILL = "> 0, or x or y an oscillation: the friction of a contact that does not move is not fixed"
@@ -45,43 +45,43 @@ _OF_A_BALL = (
 
 
 class Term(NamedTuple):
-    """One harmonic of a motion: amplitude sin(harmonic omega t + phase)."""
+    """Hold one harmonic of a motion: amplitude sin(harmonic omega t + phase)."""
 
     harmonic: int
-    amplitude: Array  #: [m], of the normal force [N]; ``(n,)`` once broadcast
+    amplitude: Array  #: [m], or for the normal force [N]; ``(n,)`` after broadcasting
     phase: Array  #: [rad]
 
     def evaluate(self, tau: Array, i: int) -> Array:
-        """Return values of case i at tau = omega t."""
+        """Return the values of case i at tau = omega t."""
         out: Array = self.amplitude[i] * np.sin(self.harmonic * tau + self.phase[i])
         return out
 
 
 class _Cycle(NamedTuple):
     t: Array  #: time [s], from 0 to the end of the period
-    x: Array  #: way of the upper point along the drag [m], that of the drag included
-    y: Array  #: and across [m]
-    Fx: Array  #: the force on it along [N], mu_macro Fz in the mean
-    Fy: Array  #: and across [N]
+    x: Array  #: displacement of the upper point along the drag [m], including the drag
+    y: Array  #: displacement across [m]
+    Fx: Array  #: force on it along the drag [N]; its mean is mu_macro Fz
+    Fy: Array  #: force across [N]
     Fz: Array  #: normal force [N]
 
 
 class Cycle(Result, _Cycle):
-    """One steady period of one case, arrays (n + 1,)."""
+    """Hold one steady period of one case, arrays (n + 1,)."""
 
     __slots__ = ()
 
     @property
     def columns(self) -> dict[str, Array]:
-        """The times, and what is there at each."""
+        """Return the times, and the displacements and forces at each time."""
         return self._asdict()
 
     def plot(self, ax: Any = None) -> Any:
-        """Return the forces over the period, and beside them the path of the upper point with the
+        """Draw the forces over the period, and next to them the path of the upper point with the
         force at 16 moments.
 
-        ``ax`` are two axes of matplotlib, or one, which gets no path, or new ones; those of the
-        forces are returned.
+        ``ax`` is a pair of matplotlib axes, or one (then no path is drawn), or None for new ones.
+        The axes of the forces are returned.
         """
         return plotting.plot_cycle(*self, ax=ax)
 
@@ -89,7 +89,7 @@ class Cycle(Result, _Cycle):
         return f"<Cycle of {self.t.size} times>"
 
 
-#: what a motion has: unit and meaning
+#: members of a motion: unit and meaning
 NUMBERS = {
     "mu_macro": ("-", "mean force along / Fz"),
     "mu_lateral": ("-", "mean force across / Fz"),
@@ -104,17 +104,17 @@ NUMBERS = {
 
 @dataclass(frozen=True)
 class Scenes:
-    """Inputs of n cases: columns (n,) in SI, and harmonics of x, y and the normal force."""
+    """Hold the inputs of n cases: columns (n,) in SI, and harmonics of x, y and the normal force."""
 
     columns: dict[str, Array]  #: mu0, Fz, k, omega, v0
     terms: tuple[tuple[Term, ...], ...]
     contact: str
     tolerance: float
-    frequency: str  #: the word for it that the caller used: omega or f
+    frequency: str  #: the input that the caller used: omega or f
 
     @property
     def amplitudes(self) -> tuple[Array, ...]:
-        """The largest amplitude of each part (n,): 0 where it does not oscillate."""
+        """Return the largest amplitude of each part (n,): 0 if it does not oscillate."""
         still = np.zeros(self.columns["mu0"].size)
         return tuple(
             np.asarray(np.maximum.reduce([still, *(term.amplitude for term in part)]))
@@ -123,18 +123,18 @@ class Scenes:
 
     @property
     def orders(self) -> tuple[tuple[int, ...], ...]:
-        """The harmonics of each part."""
+        """Return the harmonics of each part."""
         return tuple(tuple(term.harmonic for term in part) for part in self.terms)
 
     @property
     def length(self) -> Array:
-        """l0 = mu0 Fz / k [m]."""
+        """Return l0 = mu0 Fz / k [m]."""
         c = self.columns
         return np.asarray(c["mu0"] * c["Fz"] / c["k"])
 
     @property
     def dimensionless(self) -> Array:
-        """The cases as the kernel takes them, (n, 1 + 2 terms)."""
+        """Return the cases as the kernel takes them, (n, 1 + 2 terms)."""
         c = self.columns
         with np.errstate(all="ignore"):  # illegal cases are left out later
             length = self.length
@@ -147,26 +147,29 @@ class Scenes:
 
 @dataclass(frozen=True, repr=False)
 class Motion(Result):
-    """Steady cycles: floats for one case, arrays of the broadcast shape otherwise; NaN at an
-    illegal case of an array."""
+    """Hold steady cycles: floats for one case, otherwise arrays of the broadcast shape, with NaN at
+    an illegal case."""
 
-    mu_macro: Any  #: mean force along the drag over the mean normal force [-]; may be negative
-    mu_lateral: Any  #: mean force along y over the mean normal force [-]
-    stick_fraction: Any  #: share of the period, of a ball that of its springs, too [-]
-    slip_path: Any  #: of the foot per period [m]; of a ball the mean of its springs
-    power: Any  #: of the shaker in x and y [W], mean
-    power_drive: Any  #: of the drive [W], mu_macro Fz v0
-    error_estimate: Any  #: of mu_macro and mu_lateral [-]
-    #: [-] until a small disturbance has fallen to 1 %, of a ball by its slowest spring; infinite
-    #: where nothing slips
+    #: mean force along the drag, divided by the mean normal force [-]; may be negative
+    mu_macro: Any
+    mu_lateral: Any  #: mean force along y, divided by the mean normal force [-]
+    stick_fraction: Any  #: fraction of the period; for a ball the mean of its springs [-]
+    #: slip path of the contact point per period [m]; for a ball the mean of its springs
+    slip_path: Any
+    power: Any  #: mean power of the shaker in x and y [W]
+    power_drive: Any  #: mean power of the drive [W], mu_macro Fz v0
+    error_estimate: Any  #: estimated error of mu_macro and mu_lateral [-]
+    #: number of periods until a small disturbance has fallen to 1 % [-]; for a ball that of its
+    #: slowest spring; infinite if nothing slips
     periods: Any
     scenes: Scenes = field(compare=False)
 
     def cycle(self, index: int | None = None, points: int = 400) -> Cycle:
-        """Return one steady period at ``points`` + 1 equal times.
+        """Return one steady period at ``points`` + 1 equally spaced times.
 
-        ``index`` is the place of a case in the flattened arrays, needed where there are many.  A
-        ball has 64 springs here; the mean of Fx/Fz may differ from ``mu_macro`` by 1e-3 mu0.
+        ``index`` is the place of a case in the flattened arrays; it is needed if there are several
+        cases.  A ball has 64 springs here, so the mean of Fx/Fz may differ from ``mu_macro`` by
+        1e-3 mu0.
         """
         i, scenes = self._place(index), self.scenes
         if isinstance(points, bool) or not isinstance(points, int) or not 2 <= points <= 10**6:
@@ -193,11 +196,11 @@ class Motion(Result):
         return Cycle(tau / omega, v0 * (tau / omega) + x, y, Fx, Fy, Fz + load)
 
     def plot(self, ax: Any = None, *, index: int | None = None) -> Any:
-        """Return forces over a period, and beside them the path of the upper point with the force
-        at 16 moments; of many cases the one at ``index``, as in :meth:`cycle`.
+        """Draw the forces over a period, and next to them the path of the upper point with the
+        force at 16 moments.  Of several cases, ``index`` selects one, as in :meth:`cycle`.
 
-        ``ax`` are two axes of matplotlib, or one, which gets no path, or new ones; those of the
-        forces are returned.
+        ``ax`` is a pair of matplotlib axes, or one (then no path is drawn), or None for new ones.
+        The axes of the forces are returned.
         """
         i = self._place(index)
         case = {name: float(column[i]) for name, column in self.scenes.columns.items()}
@@ -206,7 +209,7 @@ class Motion(Result):
         return plotting.plot_cycle(*self.cycle(index), case["mu0"], title, ax)
 
     def _oscillations(self, i: int) -> list[str]:
-        """Return the amplitudes and phases of a case in words, a text for each part that
+        """Return the amplitudes and phases of a case in words: one text for each part that
         oscillates."""
         words = []
         for symbol, part in zip(("$x$", "$y$", "$F_z$"), self.scenes.terms, strict=True):
@@ -230,14 +233,15 @@ class Motion(Result):
 
     @property
     def columns(self) -> dict[str, Any]:
-        """The numbers by name, each in the shape of the cases."""
+        """Return the results by name, each in the shape of the cases."""
         return {name: getattr(self, name) for name in NUMBERS}
 
     @property
     def notes(self) -> list[Note]:
-        """What to do where the search gave up before the estimate was below the tolerance; and what
-        is doubtful, as of an answer: every amplitude as y0, that of the normal force as
-        Fz_amplitude, and where nothing oscillates."""
+        """Return the notes.  A warning says what to do if the search gave up before the estimate
+        was below the tolerance.  A remark names an unusual input: each amplitude is checked as y0,
+        that of the normal force as Fz_amplitude, and a motion without oscillation has a remark,
+        too."""
         scenes = self.scenes
         doubts = remarks_on_motion(
             scenes.columns,
@@ -247,7 +251,7 @@ class Motion(Result):
         return [*self._gave_up(), *doubts]
 
     def _gave_up(self) -> list[Note]:
-        """Return a warning where the error is above the tolerance."""
+        """Return a warning for cases whose error is above the tolerance."""
         c, tolerance = self.scenes.columns, self.scenes.tolerance
         error = np.ravel(self.error_estimate)
         left = error > tolerance * c["mu0"] * (1.0 + 1e-9)
@@ -277,7 +281,7 @@ class Motion(Result):
         return None if np.shape(self.mu_macro) else []
 
     def _in_full(self) -> tuple[str, Rows | None, list[str]]:
-        """Return of one case a number a row, with unit and meaning."""
+        """Return the results of one case, one in a row, with unit and meaning."""
         if np.shape(self.mu_macro):
             return super()._in_full()
         rows: Rows = [
@@ -310,38 +314,39 @@ def motion(
     mu0, Fz, k : array_like
         Coulomb friction [-], mean normal force [N], tangential stiffness [N/m], all > 0.
     v0 : array_like
-        Drag along x [m/s], >= 0.  At 0 the contact starts without force, where the motion leaves
-        a choice.
+        Drag along x [m/s], >= 0.  At 0 there may be several steady cycles; then the contact starts
+        without force.
     omega or f : array_like
         Angular frequency [rad/s] or frequency [Hz], > 0, of the period.
     x, y, normal : array_like, tuple or list
         Oscillations along [m], across [m] and of the normal force [N].  Each is an amplitude (half
         of peak to peak), a text such as "2um@90deg" or "2um, 3:0.4um@90deg", a pair (amplitude,
-        phase in degrees), or a list of triples (harmonic, amplitude, phase), that is amplitude
-        sin(harmonic omega t + phase).  Harmonics are whole
-        numbers from 1 to 1000.  Phases beyond 360 count as what is left of them.
+        phase in degrees), or a list of triples (harmonic, amplitude, phase); a triple means
+        amplitude sin(harmonic omega t + phase).  Harmonics are whole numbers from 1 to 1000.
+        Phases beyond 360 degrees count modulo 360.
     contact : str
         "spring", or "ball" under a constant normal force.
     tolerance : float
-        Of the mean force over mu0 Fz, 1e-9 to 1e-2.  A motion that needs more than 50 million
-        steps, some seconds, gives up; ``warnings`` says so.
+        Tolerance of the mean force over mu0 Fz, 1e-9 to 1e-2.  The search for a motion that needs
+        more than 50 million steps, some seconds, gives up; ``warnings`` says so.
     threads : int, optional
-        Threads for arrays; all processors if left out.
+        Threads for arrays; all processors by default.
 
     Returns
     -------
     Motion
-        ``error_estimate`` is below ``tolerance mu0``, unless the search gives up; then it says what
-        is left.  ``stick_fraction`` and ``slip_path`` have no estimate and are less accurate: a
-        brief stick or a slow approach to the cycle hardly changes a mean force.
+        ``error_estimate`` is below ``tolerance mu0``, unless the search gives up; then it says how
+        large the error still is.  ``stick_fraction`` and ``slip_path`` have no estimate and are
+        less accurate, because a brief stick or a slow approach to the cycle hardly changes a mean
+        force.
 
     Raises
     ------
     InputError
-        A single value out of bounds; in arrays such a case is NaN.  At once for an input that is
-        missing or without a meaning, a ball whose normal force oscillates, shapes that do not
-        broadcast, an array with a negative amplitude: it may hold samples, which
-        :func:`mumacro.harmonics` takes.
+        If a single value is out of bounds; in arrays such a case has NaN.  Always if an input is
+        missing or has no meaning, a ball has an oscillating normal force, shapes do not broadcast,
+        or an array has a negative amplitude: it may hold samples, which :func:`mumacro.harmonics`
+        takes.
 
     Examples
     --------
@@ -392,7 +397,7 @@ def motion(
 
 
 def _terms(name: str, part: Any) -> Iterable[Term]:
-    """Yield the harmonics of one part of a motion; none for an amplitude 0."""
+    """Yield the harmonics of one part of a motion; yield nothing for an amplitude 0."""
     for order, amplitude, degrees in read_oscillation(name, part):
         size = np.asarray(amplitude, np.float64)
         with np.errstate(invalid="ignore"):
@@ -402,7 +407,8 @@ def _terms(name: str, part: Any) -> Iterable[Term]:
 
 
 def _legal(scenes: Scenes, one: bool) -> Bools:
-    """Return which cases have an answer, (n,); InputError for ``one`` that has none."""
+    """Return which cases have an answer, (n,).  If there is only ``one`` case and it has none,
+    raise InputError."""
     c, frequency = scenes.columns, scenes.frequency
     legal = np.ones(c["mu0"].size, dtype=np.bool_)
 
@@ -468,7 +474,7 @@ def _lowest_load(scenes: Scenes, legal: Bools) -> Array:
     most = max(term.harmonic for term in part)
     tau = np.linspace(0.0, 2.0 * math.pi, 64 * most, endpoint=False)
     for i in np.flatnonzero(legal & ~(low > 0.0)):
-        # between the points it is lower by less than its curvature allows
+        # between these points the load may be lower, by at most the bound that its curvature gives
         bend = sum(term.harmonic**2 * term.amplitude[i] for term in part)
         load = Fz[i] + sum((term.evaluate(tau, int(i)) for term in part), np.zeros(tau.size))
         low[i] = load.min() - bend * tau[1] ** 2 / 8.0
@@ -476,7 +482,7 @@ def _lowest_load(scenes: Scenes, legal: Bools) -> Array:
 
 
 def _steady(scenes: Scenes, legal: Bools, threads: int) -> Array:
-    """Return rows of the kernel for the legal cases."""
+    """Return the rows of the kernel for the legal cases."""
     cases = np.ascontiguousarray(scenes.dimensionless[legal])
     out = np.empty((cases.shape[0], 7))
     ball = scenes.contact == "ball"
@@ -488,7 +494,7 @@ def _steady(scenes: Scenes, legal: Bools, threads: int) -> Array:
         _KERNEL.motions(
             int(ball), scenes.orders, cases[part], scenes.tolerance, out[part], stop.flag
         )
-        stop.look()  # what it reached by then is no answer
+        stop.look()  # a result that was interrupted does not count
 
     starts = range(0, cases.shape[0], step)
     if threads == 1 or len(starts) < 2:
@@ -515,7 +521,7 @@ def _answer(scenes: Scenes, rows: Array, shape: tuple[int, ...]) -> Motion:
             "power": work / (2.0 * math.pi) * limit * length * c["omega"],
             "power_drive": mu * c["Fz"] * c["v0"],
             "error_estimate": c["mu0"] * error,
-            # a decay that small is rounding of a contact that sticks
+            # such a slow decay is a rounding error of a contact that sticks
             "periods": np.where(decay <= 1e-12, math.inf, math.log(1.0 / REMAINING) / decay),
         }
     answers: dict[str, Any] = {

@@ -1,5 +1,5 @@
-"""One oscillation of a motion, of any form, read as harmonics: a number, a text such as
-``2um@90deg``, a pair, mappings, or a list of harmonics."""
+"""Read one oscillation of a motion as harmonics: a number, a text such as ``2um@90deg``, a pair,
+mappings, or a list of harmonics."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -28,15 +28,15 @@ _SAMPLES = (
     "mumacro.harmonics(samples).terms"
 )
 _MEMBERS = ("harmonic", "amplitude", "phase")
-#: harmonic, amplitude in SI, phase in degrees; both numbers or arrays
+#: harmonic, amplitude in SI, phase in degrees; the last two are numbers or arrays
 Harmonic = tuple[int, Any, Any]
 
 
 def read_oscillation(name: str, value: Any) -> list[Harmonic]:
-    """Return the harmonics of x, y [m] or the normal force [N].
+    """Return the harmonics of x, y [m] or of the normal force [N].
 
-    InputError names the part: ``x``, or ``x, harmonic``, ``x, amplitude``, ``x, phase``.  Of an
-    array of amplitudes none may be negative: samples of a motion are not taken for amplitudes.
+    InputError names the part: ``x``, or ``x, harmonic``, ``x, amplitude``, ``x, phase``.  An array
+    with a negative amplitude is refused, because it may hold samples of a motion.
 
     >>> read_oscillation("y", "2um, 3:0.5um@90deg")
     [(1, 2e-06, 0.0), (3, 5e-07, 90.0)]
@@ -52,7 +52,7 @@ def read_oscillation(name: str, value: Any) -> list[Harmonic]:
 
 
 def _parts(name: str, value: Any) -> list[tuple[Any, Any, Any]]:
-    """Return harmonic, amplitude and phase of each part, as they came."""
+    """Return harmonic, amplitude and phase of each part, as the caller wrote them."""
     if isinstance(value, str):
         return _of_text(name, value)
     if isinstance(value, Mapping):
@@ -74,14 +74,14 @@ def _parts(name: str, value: Any) -> list[tuple[Any, Any, Any]]:
 
 
 def _is_term(part: Any) -> bool:
-    """Return whether a part of a tuple is a harmonic, and no amplitude or phase."""
+    """Return whether a part of a tuple is a harmonic, and not an amplitude or a phase."""
     return isinstance(part, Mapping) or (isinstance(part, tuple) and len(part) == 3)
 
 
 def _of_text(name: str, text: str) -> list[tuple[Any, Any, Any]]:
-    """Return ``harmonic:amplitude@phase``, of several harmonics separated by commas.
+    """Return the parts of ``harmonic:amplitude@phase``; several harmonics are separated by commas.
 
-    A comma without a harmonic behind it is a decimal sign.
+    A comma without a harmonic after it is a decimal separator.
     """
     pieces: list[str] = []
     for piece in tidy(text).split(","):
@@ -107,14 +107,14 @@ def _of_text(name: str, text: str) -> list[tuple[Any, Any, Any]]:
     return parts
 
 
-# a comma between digits is a decimal sign, or else it separates
+# a comma between digits is a decimal separator, any other comma separates harmonics
 _BETWEEN = (re.compile(r"[\s;∠]+|,(?!\d)|(?<!\d),"), re.compile(r"[\s;∠,]+"))
 _WORDS = ("phase", "at", "and", "with")
 
 
 def _with_phase(name: str, text: str) -> str | None:
-    """Return what is meant by an amplitude and a phase that no @ separates; None where there is
-    none.
+    """Return what an amplitude and a phase without @ between them may mean, or None if the text has
+    no such pair.
 
     >>> _with_phase("x", "0.5 um, phase 90 deg"), _with_phase("x", "0.5 um")
     ('0.5um@90deg', None)
@@ -166,7 +166,7 @@ def _amplitude(name: str, value: Any) -> Any:
 
 
 def _refuse_samples(name: str, values: Any) -> None:
-    """Raise InputError where one of several amplitudes is negative, as samples of a motion are."""
+    """Raise InputError if one of several amplitudes is negative, as samples of a motion are."""
     try:
         numbers = np.asarray(values, np.float64).ravel()
     except (TypeError, ValueError):
@@ -182,5 +182,5 @@ def _phase(name: str, value: Any) -> Any:
 
 
 def _plain(name: str, value: Any, quantity: str) -> Any:
-    """Return numbers in SI without a deviation."""
+    """Return numbers in SI; refuse a deviation."""
     return to_si(name, value, quantity)

@@ -1,7 +1,8 @@
-"""The inverse problem over any periodic motion: which values of one input give a mean force.
+"""Solve the inverse problem for any periodic motion: find which values of one input give a wanted
+mean force.
 
-A mean force over one input of a motion may rise and fall several times.  How its roots are found:
-:mod:`mumacro.questions.search`.
+A mean force over one input of a motion may rise and fall several times.
+:mod:`mumacro.questions.search` finds the roots.
 """
 
 import math
@@ -29,38 +30,40 @@ from mumacro.questions.solutions import Reach, Solution
 INPUTS = ("v0", "k", "Fz", "f", "omega", "mu0")
 MEMBERS = ("amplitude", "phase")
 UNKNOWNS = (*INPUTS, *(f"{part}.{member}" for part in PARTS for member in MEMBERS))
-#: what may be the target: mean forces, which have an estimate of their error
+#: possible targets: mean forces, which have an estimate of their error
 OF = ("mu_macro", "mu_lateral")
-FIRST = 49  # samples of the whole range
-_DRAWN = 200  # more places of a curve that is drawn
-_DECADES = 20.0  # a range whose ends are further apart than this factor is searched in logarithms
+FIRST = 49  # number of first samples in the whole range
+_DRAWN = 200  # additional points of a curve in a picture
+_DECADES = 20.0  # a range whose ends differ by more than this factor is searched in logarithms
 
 
 class MotionRoot(NamedTuple):
-    """One value of the unknown."""
+    """Hold one value of the unknown."""
 
     value: float  #: the unknown [SI], a phase in degrees
-    #: between them the mean force is within its error estimate of the target, to first order
+    #: between them the mean force differs from the target by less than its error estimate, to first
+    #: order
     low: float
     high: float
-    mean: float  #: the mean force over the mean load there [-]
-    error_estimate: float  #: of it [-]
+    mean: float  #: the mean force divided by the mean load at this value [-]
+    error_estimate: float  #: its error estimate [-]
 
 
 @dataclass(frozen=True, repr=False)
 class MotionSolution(Solution):
-    """All roots of every target, over a motion."""
+    """Hold all roots of every target, over a motion."""
 
     _root = MotionRoot
-    #: for v0 without a root: the solution with x turned by 180 degrees, which moves the body the
-    #: other way; None where that has no root either
+    #: for v0 without a root: the solution for the opposite x (turned by 180 degrees), which moves
+    #: the body the other way; None if that has no root either
     other_way: "MotionSolution | None"
-    samples: tuple[Array, Array] = field(compare=False)  #: of the unknown and the mean force
+    #: samples of the unknown and of the mean force
+    samples: tuple[Array, Array] = field(compare=False)
     case: Mapping[str, Any] = field(compare=False)  #: the motion, without the unknown
 
     def reason(self, index: int = 0) -> str:
-        """Return why a target has no root, and where the body moves the other way; or over which
-        range every value is one; empty where it has roots alone."""
+        """Return why a target has no root, and whether the body moves the other way; or over which
+        range every value is a root.  Return an empty text if it has only single roots."""
         text = super().reason(index)
         if self.other_way is not None and self.other_way.roots[index]:
             speed = self.other_way.roots[index][0].value
@@ -71,8 +74,8 @@ class MotionSolution(Solution):
         return text
 
     def plot(self, ax: Any = None) -> Any:
-        """Return the mean force over the unknown with the targets and their roots, on axes ``ax``
-        of matplotlib, or new ones, which are returned."""
+        """Draw the mean force over the unknown with the targets and their roots.  ``ax`` are
+        matplotlib axes, or None for new ones.  They are returned."""
         x, _ = self.samples
         places = [root.value for roots in self.roots for root in roots]
         even = np.geomspace if _log(x[0], x[-1]) else np.linspace
@@ -94,7 +97,7 @@ class MotionSolution(Solution):
         )
 
     def _motion_words(self) -> str:
-        """Return the oscillations, without the unknown part."""
+        """Return the oscillations in words, without the unknown part."""
         words = []
         for part, symbol, unit in (("x", "$x$", "m"), ("y", "$y$", "m"), ("normal", "$F_z$", "N")):
             terms = read_oscillation(part, self.case.get(part, 0.0))
@@ -126,26 +129,27 @@ def solve_motion(
         v0, k, Fz, f, omega, mu0; or amplitude or phase of a part with one harmonic: "x.amplitude",
         "x.phase", "y.amplitude", "y.phase", "normal.amplitude", "normal.phase".
     target : array_like
-        Wanted value [-], shape (n,) or a scalar; 0 is the speed at which the motion carries itself.
+        Wanted value [-], shape (n,) or a scalar.  At 0 the motion transports the body without a
+        drive; then the root of v0 is the transport speed.
     of : str
         "mu_macro", the mean force along the drag over the mean load, or "mu_lateral", across it.
     within : (float, float), optional
-        Range to search, in SI (a phase in degrees), or texts with units.  Left out: all phases; a
-        speed up to ten times the fastest of the oscillation; another input over the decades in
-        which it matters.
+        Range to search, in SI (a phase in degrees), or texts with units.  Default: all phases; a
+        speed up to ten times the fastest speed of the oscillation; another input over the decades
+        in which it matters.
     **case
-        As in :func:`mumacro.motion`, one case, without the unknown.
+        One case as in :func:`mumacro.motion`, without the unknown.
 
     Returns
     -------
     MotionSolution
-        All roots, ascending; where there is none, the range that is reachable, and for v0 the
+        All roots, ascending.  If there is no root: the range that is reachable, and for v0 the
         solution that moves the other way.
 
     Raises
     ------
     InputError
-        An unknown that a motion does not have, or that is given; an input that is missing or not
+        If the unknown is not an input of a motion, or is given; if an input is missing or is not
         one number.
 
     Examples
@@ -174,11 +178,11 @@ def solve_motion(
 
 
 def _solved(curve: "MotionCurve", low: float, high: float, targets: Array) -> MotionSolution:
-    """Return all roots in a range, without a look at the other way."""
+    """Return all roots in a range, without the solution of the other direction."""
     search = Search(curve, _places(curve, low, high), low, high, targets)
     samples = search.samples
     if samples.x.size < 4:
-        curve.evaluate(np.asarray(0.5 * (low + high)))  # says why
+        curve.evaluate(np.asarray(0.5 * (low + high)))  # raises the reason
         raise InputError("within", (low, high), "a range in which the motion is possible")
     found = search.roots()
     if curve.unknown.endswith(".phase") and high - low == 360.0:
@@ -197,16 +201,17 @@ def _solved(curve: "MotionCurve", low: float, high: float, targets: Array) -> Mo
 
 
 def _places(curve: "MotionCurve", low: float, high: float) -> Array:
-    """Return where a range is sampled first."""
+    """Return the first samples of a range."""
     if curve.unknown == "v0" and low == 0.0:
-        # a speed of 0 leaves a choice of the cycle: the search begins right beside it
+        # at a speed of 0 there may be several cycles: the search begins at the smallest speed above
+        # 0
         slow = np.geomspace(1e-6 * high, 1e-2 * high, FIRST // 3)
         return np.concatenate([slow, np.linspace(1e-2 * high, high, FIRST)[1:]])
     return (np.geomspace if _log(low, high) else np.linspace)(low, high, FIRST)
 
 
 def _without_whole_turn(roots: list[Found]) -> list[Found]:
-    """Return the roots of a phase each once: 360 degrees are 0."""
+    """Return each root of a phase once: 360 degrees is the same as 0."""
     around = len(roots) > 1 and roots[-1].high - 360.0 >= roots[0].low
     return roots[:-1] if around else roots
 
@@ -215,7 +220,7 @@ def _without_whole_turn(roots: list[Found]) -> list[Found]:
 
 
 class MotionCurve:
-    """A mean force over the unknown of one motion."""
+    """Evaluate a mean force over the unknown of one motion."""
 
     costly = True
 
@@ -243,14 +248,14 @@ class MotionCurve:
                 self.case[name] = self.number(name)
 
     def opposite(self) -> "MotionCurve":
-        """Return the same motion with x turned by half a period: it moves the other way."""
+        """Return the same motion with x shifted by half a period: it moves the body the other way."""
         terms = read_oscillation("x", self.case["x"])
         opposite = [(order, amplitude, phase + 180.0) for order, amplitude, phase in terms]
         return MotionCurve(self.unknown, self.of, {**self.case, "x": opposite})
 
     def evaluate(self, values: Array) -> tuple[Array, Array]:
-        """Return the mean force and the estimate of its error, each in the shape of the values; NaN
-        where there is no motion."""
+        """Return the mean force and its error estimate, in the shape of the values; NaN where the
+        motion does not exist."""
         case = dict(self.case)
         if self._member == "amplitude":
             case[self._part] = [(self._harmonic, values, self._phase)]
@@ -266,7 +271,7 @@ class MotionCurve:
         )
 
     def number(self, name: str) -> float:
-        """Return one given input of the case [SI]."""
+        """Return one known input of the case [SI]."""
         value = self.case.get(name)
         if value is None:
             raise InputError(name, None, f"given [{unit_of(name)}]")
@@ -277,14 +282,14 @@ class MotionCurve:
 
     @property
     def omega(self) -> float:
-        """The angular frequency [rad/s]."""
+        """Return the angular frequency [rad/s]."""
         if self.case.get("omega") is not None:
             return self.number("omega")
         return RAD_PER_CYCLE * self.number("f")
 
     def swing(self) -> float:
-        """Return the largest way of the oscillations in x and y [m], harmonics as often as they
-        turn."""
+        """Return the largest displacement of the oscillations in x and y [m]; a harmonic counts as
+        often as it turns in a period."""
         total = 0.0
         for part in ("x", "y"):
             if part != self._part or not self._member:
@@ -294,7 +299,7 @@ class MotionCurve:
 
 
 def _range(within: Any, unknown: str, curve: MotionCurve) -> tuple[float, float]:
-    """Return the range to search, ascending."""
+    """Return the range of the search, ascending."""
     if within is None:
         return _usual_range(unknown, curve)
     part, _, member = unknown.partition(".")
@@ -314,7 +319,7 @@ def _range(within: Any, unknown: str, curve: MotionCurve) -> tuple[float, float]
 
 
 def _usual_range(unknown: str, curve: MotionCurve) -> tuple[float, float]:
-    """Return where the unknown matters."""
+    """Return the range in which the unknown matters."""
     member = unknown.partition(".")[2]
     if member == "phase":
         return 0.0, 360.0
@@ -339,12 +344,12 @@ def _usual_range(unknown: str, curve: MotionCurve) -> tuple[float, float]:
             raise InputError(
                 unknown, None, "searched within=(low, high), where v0 or x and y are 0"
             )
-        middle = drag / swing  # where the oscillation is as fast as the drag
+        middle = drag / swing  # the amplitude at which the oscillation is as fast as the drag
         low, high = 1e-2 * middle, 1e4 * middle
         return (low, high) if unknown == "omega" else (low / RAD_PER_CYCLE, high / RAD_PER_CYCLE)
     if swing == 0.0:
         raise InputError(unknown, None, "searched within=(low, high), where x and y are 0")
-    if unknown == "k":  # the way of the oscillation is 1e-3 to 1e3 times mu0 Fz / k
+    if unknown == "k":  # the oscillation is 1e-3 to 1e3 times mu0 Fz / k
         middle = curve.number("mu0") * curve.number("Fz") / swing
     else:
         middle = curve.number("k") * swing / curve.number("mu0")
@@ -352,7 +357,7 @@ def _usual_range(unknown: str, curve: MotionCurve) -> tuple[float, float]:
 
 
 def _log(low: float, high: float) -> bool:
-    """Return whether a range is searched, and drawn, in logarithms."""
+    """Return whether a range is searched and drawn in logarithms."""
     return low > 0.0 and high / low > _DECADES
 
 

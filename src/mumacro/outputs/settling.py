@@ -19,9 +19,9 @@ gives S, and the duration of stick gives the angles (kernel/settling.c):
     S = 2 pi (v~ mu~ + p),    p = <y~ cos tau u_y>, the oscillation power
 
 The table has mu~, p and the stick fraction, with bounds.  The springs of a ball are independent,
-and the slowest one determines the result.  Along the ray of their v~ and y~, S is largest for the
-last spring and smallest for the first (60 rays from y~/v~ = 1e-4 to 1e6).  The cosine is not
-monotone, so the slowest spring has to be searched for.
+and the slowest one determines the result.  Their v~ and y~ are on one ray, along
+which S rises (60 rays from y~/v~ = 1e-4 to 1e6).  The cosine is not monotone there, so the slowest
+spring has to be searched for.
 """
 
 import math

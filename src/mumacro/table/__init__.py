@@ -1,1 +1,1 @@
-"""The table: its file, its blocks, and the coordinates in which they are tabulated."""
+"""Hold the table: its file, its blocks, and the coordinates in which they are tabulated."""

@@ -1,11 +1,13 @@
-"""The atlas: how the quadrant v~, y~ >= 0 is divided into blocks, and the coordinates of each.
+"""Define the atlas: how the quadrant v~, y~ >= 0 is divided into blocks, and the coordinates of
+each block.
 
-The lists of blocks and of pieces of the border are in ``kernel/atlas.c``, that of quantities in
-``kernel/records.c``; this module reads them.  What a table file calls a coordinate is defined here,
-with both ways between a chart and (v~, y~).
+``kernel/atlas.c`` lists the blocks and the pieces of the border, ``kernel/records.c`` the
+quantities; this module reads these lists.  It also defines the coordinates of a table file, and
+converts between (v~, y~) and a chart.
 
-Power p = <y~ cos tau u_y> is the mean power of the shaker in units of mu0 Fz l0 omega; that of the
-drive is v~ mu~. The stick fraction f is the share of the period during which the contact sticks.
+The power p = <y~ cos tau u_y> is the mean power of the shaker in units of mu0 Fz l0 omega; the
+power of the drive is v~ mu~.  The stick fraction f is the part of the period during which the
+contact sticks.
 """
 
 import functools
@@ -29,8 +31,8 @@ S_CUT, SIGMA_CUT = _ATLAS.s_cut, _ATLAS.sigma_cut
 RHO_MAX, FAST_KAPPA = _ATLAS.rho_max, _ATLAS.fast_kappa
 ROUNDING = _ATLAS.rounding  # of coordinates and sums, relative to the scale of the value
 SQRT2 = math.sqrt(2.0)
-#: load of a ball's middle spring over the mean; the steepest ray v~/y~ that touches the border,
-#: y~ and v~ where it does
+#: load of a ball's middle spring over the mean load; the steepest ray v~/y~ that touches the
+#: border, and y~ and v~ of the point where it touches
 MIDDLE, STEEPEST, STEEPEST_Y = _ATLAS.middle, _ATLAS.steepest, _ATLAS.steepest_y
 SLOW = _ATLAS.slow
 _KNOT, _SCALE = _ATLAS.fold_knot, _ATLAS.fold_scale
@@ -59,19 +61,20 @@ COORDINATES = {
     "s_root": "x with v_tilde = v_tilde_crit sin^2(pi x^3/2)",
     "angle_root": "x with 1 - x^3 = 2 psi/pi, the polar angle of the normal form",
 }
-#: whose cells have an edge in the middle, where evaluation changes its formula
+#: coordinates whose cells have an edge in the middle, where the formula of the evaluation changes
 _FOLDED = ("ray_root", "way_root", "s_root")
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One coordinate of a chart: its name in :data:`COORDINATES` and its range in the table file.
+    """Define one coordinate of a chart: its name in :data:`COORDINATES` and its range in the table
+    file.
 
-    Evaluation uses a coordinate that costs less than the file's where the two differ: sigma for s
-    and tan(psi/2) for the angle.  sigma is sqrt(rho), then sqrt 2 - sqrt(1 - rho) from rho =
-    v~/v~crit = 1/2 on: both square-root edges become smooth for one square root, and the knot
-    between the halves is an edge of cells.  A folded coordinate has the sixth root in place of the
-    square root at its lower end, and the second half scaled to the length of the first.
+    The evaluation uses another coordinate than the file where that is faster: sigma instead of s,
+    and tan(psi/2) instead of the angle. sigma is sqrt(rho) up to rho = v~/v~crit = 1/2, and sqrt 2
+    - sqrt(1 - rho) above.  Both square-root edges become smooth at the cost of one square root; the
+    knot between the halves is an edge of cells.  A folded coordinate has the sixth root instead of
+    the square root at its lower end, and its second half has the length of the first.
     """
 
     name: str
@@ -80,21 +83,23 @@ class Axis:
 
     @functools.cached_property
     def knotted(self) -> bool:
-        """Whether the middle must be an edge of cells."""
+        """Return whether the middle must be an edge of cells."""
         return self.name == "s" or self.name in _FOLDED
 
     @functools.cached_property
     def edge(self) -> tuple[float, float]:
-        """(end, scale) of evaluation's coordinate, end - scale sqrt(1 - x) next to x = 1."""
+        """Return (end, scale) of the evaluation's coordinate: near x = 1 it is end - scale sqrt(1 -
+        x)."""
         return (2.0 * _KNOT, _SCALE) if self.name in _FOLDED else (SQRT2, 1.0)
 
     @functools.cached_property
     def span(self) -> tuple[float, float]:
-        """The range of evaluation's coordinate; along s the cells cover all of [0, sqrt 2]."""
+        """Return the range of the evaluation's coordinate; along s the cells cover all of [0, sqrt
+        2]."""
         return (0.0, self.edge[0]) if self.knotted else (self.low, self.high)
 
     def to_file(self, x: Array) -> Array:
-        """Return the table file's coordinate at evaluation's ``x`` (n,)."""
+        """Return the table file's coordinate at the evaluation's ``x`` (n,)."""
         if self.name == "angle":
             return np.asarray(4.0 / np.pi * np.arctan(x), dtype=np.float64)
         if self.name == "angle_root":
@@ -111,12 +116,11 @@ class Axis:
         return np.asarray(2.0 / math.pi * np.where(x <= math.sqrt(0.5), low, high))
 
     def cell_positions(self, cells: int, local: Array) -> tuple[Array, Array]:
-        """Return the points ``local`` (m,), from -1 to 1, of each of the cells of this axis,
-        (cells m,): as evaluation's coordinate, and as positions in [-1, 1] on the nodes of the
-        table file.
+        """Return the points ``local`` (m,), from -1 to 1, of each cell of this axis, (cells m,): as
+        the evaluation's coordinate, and as positions in [-1, 1] on the nodes of the table file.
 
-        Along s, points below the block are never visited; cells that lie wholly below it repeat its
-        edge.
+        Along s, points below the block are never evaluated; cells that lie completely below it
+        repeat its edge.
         """
         start, stop = self.span
         edge = np.arange(cells)[:, None]
@@ -128,7 +132,7 @@ class Axis:
         return x, (2.0 * position - self.low - self.high) / (self.high - self.low)
 
     def to_evaluation(self, x: Array) -> Array:
-        """Return evaluation's coordinate at the table file's ``x`` (n,)."""
+        """Return the evaluation's coordinate at the table file's ``x`` (n,)."""
         if self.name == "angle":
             return np.asarray(np.tan(0.25 * np.pi * x), dtype=np.float64)
         if self.name == "angle_root":
@@ -153,7 +157,7 @@ class Axis:
 
 
 def _cosine(share: Array, rest: Array, name: str) -> Array:
-    """Return cos(pi/2 share), by the sine of the rest where that is what is known."""
+    """Return cos(pi/2 share), or the sine of the rest if the rest is known."""
     return np.asarray(
         np.cos(0.5 * math.pi * share) if name == "angle" else np.sin(0.5 * math.pi * rest)
     )
@@ -161,10 +165,10 @@ def _cosine(share: Array, rest: Array, name: str) -> Array:
 
 @dataclass(frozen=True)
 class TabulatedQuantity:
-    """One tabulated quantity: name, variable in a block of a table file, meaning.
+    """Describe one tabulated quantity: name, variable in a block of a table file, meaning.
 
-    ``while_sliding``: not zero in continuous sliding.  ``smooth_at_border``: without a root or a
-    jump there.
+    ``while_sliding``: whether it is not zero in continuous sliding.  ``smooth_at_border``: whether
+    it has no root and no jump there.
     """
 
     name: str
@@ -176,11 +180,12 @@ class TabulatedQuantity:
 
 @dataclass(frozen=True)
 class Chart:
-    """One block: name, regime, coordinates with their ranges, and what its nodes hold for mu~.
+    """Describe one block: name, regime, coordinates with their ranges, and what its nodes hold for
+    mu~.
 
-    ``floor`` and ``rounding`` are what the bound of mu~ allows for rounding, absolute and relative
-    to the factor.  The checksum of a table covers the repr of its charts, so the names of the other
-    fields here and in :class:`Axis` belong to the file's format.
+    ``floor`` and ``rounding`` are the allowance for rounding in the bound of mu~: absolute, and
+    relative to the factor.  The checksum of a table covers the repr of its charts, so the names of
+    the other fields here and in :class:`Axis` belong to the file's format.
     """
 
     name: str
@@ -197,7 +202,7 @@ class Chart:
         """Return (v~, y~, eta = y~ - 1) at the table file's coordinates ``a``, ``b`` (broadcast
         together).
 
-        eta is exact in the corner, where rounding y~ to double costs 1e-16/mu~.  ``border_of``
+        eta is exact in the corner, where rounding y~ to double would cost 1e-16/mu~.  ``border_of``
         gives v~crit(y~): the stored curve, so that nodes and evaluation use the same one.
         """
         a, b = np.broadcast_arrays(a, b)
@@ -205,7 +210,7 @@ class Chart:
             share = b if self.b.name == "angle" else 1.0 - b**3
             rest = 1.0 - b if self.b.name == "angle" else b**3
             phi = a * np.sin(0.5 * math.pi * share) / SQRT2
-            # the sine of what is left keeps its digits next to the static limit
+            # the sine of the rest keeps its digits near the static limit
             s0 = SQRT2 * a * _cosine(share, rest, self.b.name)
             eta = 0.25 * s0 * s0 - 0.5 * phi * phi
             return phi * s0 * s0 / (2.0 * math.pi), 1.0 + eta, eta
@@ -231,7 +236,7 @@ class Chart:
         return v, y, y - 1.0
 
     def holds(self, quantity: TabulatedQuantity) -> bool:
-        """Return whether the block tabulates a quantity; elsewhere it is zero."""
+        """Return whether the block tabulates a quantity; if not, the quantity is zero there."""
         return self.regime != CONTINUOUS or quantity.while_sliding
 
 
@@ -245,7 +250,7 @@ def _quantity(q: Any) -> TabulatedQuantity:
 
 
 def _listed(entry: Callable[[int], Any]) -> Iterator[Any]:
-    """Yield the entries of a list of the kernel, which ends with one that is null."""
+    """Yield the entries of a list of the kernel; its end is a null entry."""
     return itertools.takewhile(bool, map(entry, itertools.count()))
 
 
@@ -259,13 +264,13 @@ def _charts(contact: int) -> tuple[Chart, ...]:
 
 
 #: the blocks of each contact that is shaken across, in the order of the kernel's codes of contacts;
-#: those of a ball are over v~/1.5 and y~/1.5
+#: the blocks of a ball are over v~/1.5 and y~/1.5
 CHARTS: dict[str, tuple[Chart, ...]] = {
     name: _charts(contact) for contact, name in enumerate(("spring", "ball"))
 }
-#: a spring's; a block's place in this list is the source code of its values
+#: blocks of a spring; the index of a block in this list is the source code of its values
 BLOCK_NAMES = tuple(chart.name for chart in CHARTS["spring"])
-#: v~crit in pieces: name, coordinate, what its nodes hold
+#: pieces of v~crit: name, coordinate, what its nodes hold
 BORDER_PIECES = tuple(
     (_text(p.name), _axis(p.axis), _text(p.tabulated))
     for p in (_ATLAS.piece[i] for i in range(_ATLAS.pieces))
@@ -274,7 +279,7 @@ QUANTITIES = tuple(map(_quantity, _listed(kernels[-1].quantity)))
 QUANTITY_NAMES = tuple(quantity.name for quantity in QUANTITIES)
 MU, POWER, STICK = map(QUANTITY_NAMES.index, ("mu_ratio", "power", "stick_fraction"))
 _SOURCES = tuple(itertools.takewhile(lambda s: s.name, map(kernels[-1].source, itertools.count())))
-#: where an answer comes from: a block, or a limit in closed form
+#: source of an answer: a block, or a limit in closed form
 SOURCES = tuple(_text(source.name) for source in _SOURCES)
 #: regime code of every source code
 REGIME_OF_SOURCE = np.array([source.regime for source in _SOURCES], dtype=np.int8)

@@ -1,4 +1,4 @@
-"""Files that are either complete or absent."""
+"""Write files that are either complete or absent."""
 
 import os
 from collections.abc import Iterator
@@ -26,11 +26,11 @@ def to_disk(stream: BinaryIO) -> None:
 
 @contextmanager
 def growing(path: Path) -> Iterator[BinaryIO]:
-    """Yield a file to be written within the block; at its end it is on the disk, whole, and takes
-    the place of an older one.
+    """Yield a file that is written within the block.  At the end of the block it is complete on the
+    disk, and replaces an older one.
 
-    An exception leaves nothing behind, and an older file stays.  On Linux the new file has no name
-    before its end: a killed process leaves nothing, either.
+    After an exception nothing is left, and an older file stays.  On Linux the new file has no name
+    before its end, so a killed process leaves nothing, either.
     """
     name = path.with_name(f".{path.name}.{os.urandom(4).hex()}.growing")
     handle = _without_name(path.parent)
@@ -40,7 +40,7 @@ def growing(path: Path) -> Iterator[BinaryIO]:
             yield stream
             to_disk(stream)
             if handle is not None:
-                # a descriptor of the source, whichever it is, makes Python follow the link
+                # Python follows the link because its source is a descriptor
                 os.link(f"/proc/self/fd/{handle}", name, src_dir_fd=handle)
         os.replace(name, path)
     except BaseException:
@@ -50,19 +50,20 @@ def growing(path: Path) -> Iterator[BinaryIO]:
 
 
 def _without_name(folder: Path) -> int | None:
-    """Return a new file without a name in a folder; None where the system or its disk has none."""
+    """Return a new file without a name in a folder, or None if the system or its disk cannot do
+    this."""
     if not hasattr(os, "O_TMPFILE") or not Path("/proc/self/fd").is_dir():
         return None
     try:
         return os.open(folder, os.O_TMPFILE | os.O_WRONLY, 0o666)
-    except OSError:  # of the folder itself, too: opening by name tells it
+    except OSError:  # also an error of the folder itself: opening by name will report it
         return None
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file that is complete or absent.
+    """Write a file so that it is complete or absent.
 
-    OSError leaves nothing behind, and an older file stays.
+    After OSError nothing is left, and an older file stays.
     """
     with growing(path) as stream:
         stream.write(content)

@@ -1,21 +1,21 @@
-"""The bundled tables: inside the package when installed, in ``tables/`` of a checkout."""
+"""Find the bundled tables: inside the package when installed, in ``tables/`` of a checkout."""
 
 from pathlib import Path
 
 from mumacro.errors import InputError, TableError
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-_CHECKOUT = _PACKAGE.parent.parent  # of a checkout, whose library stands in src/mumacro
+_CHECKOUT = _PACKAGE.parent.parent  # folder of a checkout, whose library is in src/mumacro
 
 
 def bundled_tables() -> list[Path]:
-    """Return the table files that come with the library, by name: of the installed wheel, else of
-    the checkout.
+    """Return the table files that come with the library, by name: those of the installed wheel, or
+    else those of the checkout.
 
     >>> sorted(path.name for path in bundled_tables())[0]
     'mumacro-1e-10.nc'
     """
-    # A folder "tables" there may belong to another project; this project's are mumacro-*.nc.
+    # A folder "tables" may belong to another project; the files of this project are mumacro-*.nc.
     for folder in (_PACKAGE / "data", _CHECKOUT / "tables"):
         paths = sorted(folder.glob("mumacro-*.nc"))
         if paths:
@@ -24,7 +24,7 @@ def bundled_tables() -> list[Path]:
 
 
 def bundled_table(tolerance: float | None) -> Path:
-    """Return the tightest bundled table, or the smallest that meets ``tolerance``."""
+    """Return the tightest bundled table, or the smallest one that meets ``tolerance``."""
     tables = {float(path.stem.removeprefix("mumacro-")): path for path in bundled_tables()}
     if not tables:
         raise TableError("mumacro-*.nc", "no table is bundled with this installation; name a file")

@@ -1,9 +1,9 @@
-"""Reading HDF5 files from unknown sources: the parts of a netCDF-4 file, by name, with a limit of
+"""Read HDF5 files from unknown sources: the parts of a netCDF-4 file, by name, with a limit of
 memory.
 
 The netCDF library reads all of a file when it opens it, follows cyclic links until the stack is
 full, and unpacks data beyond their declared size.  Here only the requested parts are read, sizes
-are checked before memory is taken, and numbers are unpacked up to the size that they have.
+are checked before memory is used, and numbers are unpacked up to their declared size.
 """
 
 import math
@@ -18,23 +18,23 @@ from h5py import h5a, h5d, h5f, h5g, h5l, h5o, h5s, h5t, h5z
 
 from mumacro.kernel.arrays import Array
 
-MOST_ATTRIBUTES = 64  # attributes of a group, at most
-MOST_TEXT = 65_536  # bytes of an attribute, at most
-MOST_ITEMS = 64  # numbers of an attribute, at most
+MOST_ATTRIBUTES = 64  # limit of the attributes of a group
+MOST_TEXT = 65_536  # limit of the bytes of an attribute
+MOST_ITEMS = 64  # limit of the numbers of an attribute
 _FILTERS = ((), (h5z.FILTER_DEFLATE,), (h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE))
 
 
 class RefusedError(Exception):
-    """The reason why a file is refused."""
+    """Tell the reason why a file is refused."""
 
 
 @dataclass(frozen=True)
 class Group:
-    """What a group of a file holds, by name."""
+    """Hold the content of a group of a file, by name."""
 
     path: str
-    #: texts, numbers, and vectors of numbers (n,) with n > 1, in the order in which they were made,
-    #: but for those of the netCDF library itself
+    #: texts, numbers, and vectors of numbers (n,) with n > 1, in the order of their creation,
+    #: without the netCDF library's own attributes
     attributes: dict[str, Any] = field(default_factory=dict)
     arrays: dict[str, Array] = field(default_factory=dict)  #: finite float64
     groups: dict[str, "Group"] = field(default_factory=dict)
@@ -42,23 +42,23 @@ class Group:
 
 @dataclass(frozen=True)
 class Part:
-    """What is read of a group: variables and groups by name; what the file does not have is left
-    out."""
+    """Name what to read of a group: variables and groups by name.  If the file does not have one,
+    it is left out."""
 
     variables: tuple[str, ...] = ()
     groups: Mapping[str, "Part"] = field(default_factory=dict)
 
 
 class File:
-    """A file in memory; every method raises RefusedError where a part is of another kind or too
+    """Read a file in memory.  Every method raises RefusedError if a part has another type or is too
     large."""
 
     def __init__(self, image: bytes, most: int, most_in_all: int) -> None:
-        """Open the bytes of a file, of which a variable may have ``most`` numbers, and all that is
-        read of them ``most_in_all``.
+        """Open the bytes of a file.  A variable may have up to ``most`` numbers, and everything
+        that is read up to ``most_in_all``.
 
-        Raise RefusedError where they are no HDF5; in what is read later h5py raises nearly any
-        exception.
+        Raise RefusedError if they are not HDF5.  Later reads may raise nearly any exception of
+        h5py.
         """
         try:
             file = h5f.open_file_image(image)
@@ -69,11 +69,11 @@ class File:
         self._most, self._rest = most, most_in_all
 
     def attributes(self) -> dict[str, Any]:
-        """Return the attributes of the root, as :class:`Group` has them."""
+        """Return the attributes of the root, as in :class:`Group`."""
         return _attributes(self._root, "/")
 
     def read(self, part: Part) -> Group:
-        """Return the root with the parts that are named."""
+        """Return the root with the named parts."""
         return self._group(self._root, "/", part)
 
     def _group(self, handle: Any, path: str, part: Part) -> Group:
@@ -89,7 +89,7 @@ class File:
         return group
 
     def _array(self, dataset: Any, name: str) -> Array:
-        """Return a variable, as the netCDF library stores numbers."""
+        """Return a variable of numbers as the netCDF library stores them."""
         space, creation = dataset.get_space(), dataset.get_create_plist()
         is_double = space.get_simple_extent_type() == h5s.SIMPLE and dataset.get_type().equal(
             h5t.IEEE_F64LE
@@ -114,7 +114,8 @@ class File:
         return values
 
     def _unpacked(self, dataset: Any, name: str, filters: tuple[int, ...]) -> Array:
-        """Return the one chunk of a variable, unpacked here with a limit: HDF5 itself has none."""
+        """Return the only chunk of a variable, unpacked here with a limit, because HDF5 has no
+        limit."""
         size = 8 * math.prod(dataset.shape)
         if (
             dataset.get_num_chunks() != 1
@@ -134,9 +135,9 @@ class File:
 
 
 def _member(handle: Any, path: str, name: str, part_type: type, role: str) -> Any:
-    """Return a variable or a group in a group; None where there is none of this name."""
+    """Return a variable or a group of this name in a group, or None if there is none."""
     links, key = handle.links, name.encode()
-    # other links than hard ones may lead to other files
+    # a link that is not a hard link may lead to another file
     if not links.exists(key) or links.get_info(key).type != h5l.TYPE_HARD:
         return None
     part = h5o.open(handle, key)
@@ -159,7 +160,7 @@ def _attributes(handle: Any, path: str) -> dict[str, Any]:
 
 
 def _value(attribute: Any, name: str) -> Any:
-    """Return text, a number, or a vector of numbers."""
+    """Return the value of an attribute: a text, a number, or a vector of numbers."""
     hdf5_type, shape = attribute.get_type(), attribute.shape
     if attribute.get_storage_size() > MOST_TEXT or math.prod(shape) > MOST_ITEMS:
         raise RefusedError(f"{name} is too large")

@@ -1,9 +1,10 @@
-"""The table file, format 2: netCDF-4 with CF-1.11 conventions; written atomically, checked on
-reading.
+"""Read and write the table file, format 2: netCDF-4 with CF-1.11 conventions; written atomically,
+checked when read.
 
-docs/table-format.md has the layout: the plain grid at the root, the pieces of v~crit in ``border``,
-the blocks of each contact inside, in a group with the contact's name.  The netCDF library writes,
-and is not thread-safe: a lock is held while it works.  For reading see ``mumacro.table.hdf5``.
+docs/table-format.md describes the layout: the plain grid at the root, the pieces of v~crit in
+``border``, the blocks of each contact in a group with the contact's name.  The netCDF library
+writes; it is not thread-safe, so a lock is held while it works.  For reading see
+``mumacro.table.hdf5``.
 """
 
 import hashlib
@@ -33,14 +34,14 @@ from mumacro.table.hdf5 import RefusedError
 from mumacro.table.polynomials import nodes
 
 FORMAT_VERSION = 2
-# What is larger is refused before memory is taken; behind each limit the figure of the largest
-# table that the builder makes
+# A larger file is refused before memory is used.  After each limit follows the figure of the
+# largest table that the builder makes.
 MOST_BYTES = 16 * 2**20  # bytes of a file: 425 kB
 MOST_NUMBERS = 200_000  # numbers of a variable: 14,641
 MOST_IN_ALL = 2_000_000  # numbers of a table: 171,000
-MOST_NODES = 1024  # nodes along an axis: 91; preparing cells takes matrices of its square
+MOST_NODES = 1024  # nodes along an axis: 91; preparing cells needs matrices of its square
 MOST_CELLS = 1024  # cells along an axis: 156
-MOST_PATCHES = 8192  # cells of a block: 1833; each takes 512 bytes for each quantity
+MOST_PATCHES = 8192  # cells of a block: 1833; each needs 512 bytes for each quantity
 
 _netcdf_lock = threading.Lock()
 
@@ -61,21 +62,22 @@ _PLAIN = {
         ("y_tilde",),
     ),
 }
-#: attributes of ``mu_ratio`` beside its name and unit
+#: attributes of ``mu_ratio`` apart from its name and unit
 _OF_MU_RATIO = {
     "ancillary_variables": "error_estimate",
     "comment": "right at the nodes; interpolation between them errs as much as the attributes "
     "interpolation_error_* of the file say, mumacro itself answers from the blocks in /border",
 }
-#: what every contact states
+#: attributes of every contact
 _STATED = ("tolerance", "verified_max_abs_error", "verified_max_rel_error")
 CELL_AXES = ("quantity", "cell", "derivative")
-LEAST_PACKED = 256  # numbers: as few are stored as they are, since a chunk's index takes 2 kB
+# a smaller number of values is stored unpacked, because a chunk's index takes 2 kB
+LEAST_PACKED = 256
 
 
 def _digest(table: Table) -> str:
-    """Return SHA-256 over every number that affects a value or its bound, the geometry, and the
-    tolerance."""
+    """Return the SHA-256 of every number that affects a value or its bound, of the geometry, and of
+    the tolerance."""
     h = hashlib.sha256()
 
     def include(*parts: object) -> None:
@@ -114,7 +116,7 @@ def _add_variable(
     axes: tuple[str, ...] = (),
     **attributes: Any,
 ) -> None:
-    """Add a float64 variable over ``axes``; without them it is a coordinate itself."""
+    """Add a float64 variable over ``axes``; without axes it is itself a coordinate."""
     if not axes:
         group.createDimension(name, data.size)
     filters = {"compression": "zlib", "complevel": 9, "shuffle": True, "chunksizes": data.shape}
@@ -125,8 +127,8 @@ def _add_variable(
 
 
 def _write_cell_errors(group: Any, blocks: list[Block], names: Sequence[str]) -> None:
-    """Write the errors in all cells, block after block, as one variable: each costs half a
-    kilobyte, and a dimension too."""
+    """Write the errors in all cells, block after block, as one variable, because each variable and
+    each dimension costs half a kilobyte."""
 
     def rows(block: Block, name: str) -> Array:
         return (
@@ -171,14 +173,14 @@ def _write(root: Any, table: Table) -> None:
                 "range": np.array([axis.low, axis.high]),
             }
         )
-    # inside the border, which they are fitted to: with a second group at the root the CF checker
-    # looks for "time"
+    # Contacts are inside the group of the border, because with a second group at the root the CF
+    # checker looks for "time".
     for contact in table.contacts.values():
         _write_contact(border.createGroup(contact.name), table, contact)
 
 
 def _write_contact(group: Any, table: Table, contact: TabulatedContact) -> None:
-    """Write the blocks of a contact with the errors in every cell, and what is stated of them."""
+    """Write the blocks of a contact, the errors in every cell, and the statements about them."""
     group.setncatts(contact.attributes)
     _write_cell_errors(group, contact.blocks, table.quantities)
     for chart, block in zip(contact.charts, contact.blocks, strict=True):
@@ -193,7 +195,8 @@ def _write_contact(group: Any, table: Table, contact: TabulatedContact) -> None:
                 else f"{quantity.meaning}, scaled for this block"
             )
             _add_variable(one, quantity.variable, block.nodes[quantity.name], meaning, axes)
-        # eight attributes: HDF5 keeps more in a structure of its own, of several kilobytes a group
+        # at most eight attributes: HDF5 keeps more of them in a separate structure of several
+        # kilobytes per group
         one.setncatts(
             {
                 **_geometry(chart),
@@ -206,13 +209,13 @@ def _write_contact(group: Any, table: Table, contact: TabulatedContact) -> None:
 
 
 def write_table(table: Table, path: str | Path) -> str:
-    """Write ``table`` to ``path`` atomically (temporary file beside it, fsync, rename) and return
-    its checksum.
+    """Write ``table`` to ``path`` atomically (temporary file in the same folder, fsync, rename) and
+    return its checksum.
 
-    TableError where the folder does not exist or cannot be written, or the disk is full; nothing is
-    left behind.
+    Raise TableError if the folder does not exist or cannot be written, or the disk is full; then
+    nothing is left.
     """
-    import tempfile  # only writing needs it: reading a table starts sooner without
+    import tempfile  # only writing needs it: without the import a table is read sooner
 
     path = Path(path)
     table.attributes["format_version"] = np.int32(FORMAT_VERSION)
@@ -222,7 +225,7 @@ def write_table(table: Table, path: str | Path) -> str:
     except (
         OSError,
         RuntimeError,
-    ) as error:  # the netCDF library raises RuntimeError where it cannot write
+    ) as error:  # the netCDF library raises RuntimeError if it cannot write
         where = f"in the folder of temporary files, {tempfile.gettempdir()}"
         raise TableError(
             path, f"cannot be made {where}: {getattr(error, 'strerror', None) or error}"
@@ -237,10 +240,10 @@ def write_table(table: Table, path: str | Path) -> str:
 def _image(table: Table) -> bytes:
     """Return the bytes of a file that holds ``table``.
 
-    A temporary file: where the disk is full the netCDF library reports little and keeps the file
-    open.  A file that it makes in memory contains the time of day.
+    The file is temporary, because if the disk is full the netCDF library reports little and keeps
+    the file open.  A file that this library makes in memory contains the time of day.
     """
-    import tempfile  # only writing needs it: reading a table starts sooner without
+    import tempfile  # only writing needs it: without the import a table is read sooner
 
     import netCDF4  # installed only to build tables
 
@@ -255,7 +258,7 @@ def _image(table: Table) -> bytes:
 
 
 def _layout() -> hdf5.Part:
-    """Return what is read of a file."""
+    """Return which parts of a file are read."""
     variables = tuple(quantity.variable for quantity in atlas.QUANTITIES)
     groups = {name: hdf5.Part((axis.name, "value")) for name, axis, _ in atlas.BORDER_PIECES}
     for name, charts in atlas.CHARTS.items():
@@ -306,8 +309,8 @@ def _error(group: hdf5.Group, name: str) -> float:
 
 
 def _axis_nodes(group: hdf5.Group, axis: atlas.Axis) -> Array:
-    """Return the nodes of an axis; :func:`_check_nodes` compares them with those of the running
-    atlas."""
+    """Return the nodes of an axis; :func:`_check_nodes` compares them with the atlas of this
+    version."""
     values = _array(group, axis.name)
     if values.ndim != 1 or not 2 <= values.size <= MOST_NODES:
         raise RefusedError(f"{group.path}: {axis.name!r} has not 2 to {MOST_NODES} nodes")
@@ -315,9 +318,9 @@ def _axis_nodes(group: hdf5.Group, axis: atlas.Axis) -> Array:
 
 
 def _check_nodes(nodes_of: list[tuple[str, atlas.Axis, Array]]) -> None:
-    """Refuse nodes, by the path of their group, that are not those of the running atlas."""
+    """Refuse nodes, by the path of their group, that differ from the atlas of this version."""
     for path, axis, values in nodes_of:
-        # the cosine's last digit differs between mathematical libraries
+        # the last digit of the cosine depends on the mathematical library
         deviation = np.abs(values - nodes(values.size, axis.low, axis.high))
         if np.any(deviation > 1e-15 * max(abs(axis.low), abs(axis.high))):
             raise RefusedError(
@@ -344,7 +347,7 @@ def _check_same(group: hdf5.Group, name: str, expected: Any) -> None:
 
 
 def _check_contact(group: hdf5.Group) -> None:
-    """Refuse what a table states of a contact, where the program could not use it."""
+    """Refuse statements about a contact that the program could not use."""
     for name in _STATED:
         if not _numbers(group, name)[0] > 0.0:
             raise RefusedError(
@@ -360,7 +363,7 @@ def _check_contact(group: hdf5.Group) -> None:
 
 
 def _check_root(attributes: dict[str, Any]) -> list[str]:
-    """Return the names of the tabulated quantities; refuse attributes of the root that the program
+    """Return the names of the tabulated quantities.  Refuse attributes of the root that the program
     could not use."""
     root = hdf5.Group("/", attributes)
     if not {"format_version", "content_sha256"} <= attributes.keys():
@@ -401,8 +404,8 @@ def _block(
     names: list[str],
     tabulated: list[atlas.TabulatedQuantity],
 ) -> Block:
-    """Return a block of a table of the quantities ``names``, of which it has those that are
-    ``tabulated``."""
+    """Return a block of a table; ``names`` are the quantities of the table, ``tabulated`` are those
+    of this block."""
     for name, expected in _geometry(chart).items():
         _check_same(group, name, expected)
     a, b = _axis_nodes(group, chart.a), _axis_nodes(group, chart.b)
@@ -447,7 +450,7 @@ def _add_cell_errors(group: hdf5.Group, blocks: list[Block], names: Sequence[str
 
 
 def _read(file: hdf5.File) -> Table:
-    names = _check_root(file.attributes())  # another version may have other parts
+    names = _check_root(file.attributes())  # first, because another version may have other parts
     root = file.read(_layout())
     below = _group(root, "border")
     border = [_border_piece(_group(below, name), axis) for name, axis, _ in atlas.BORDER_PIECES]
@@ -468,21 +471,20 @@ def _read(file: hdf5.File) -> Table:
 
 
 def read_table(path: str | Path) -> Table:
-    """Read and check a table file; several threads may do so at once.
+    """Read and check a table file; several threads may do this at once.
 
     Raises
     ------
     TableError
-        Missing, truncated or foreign file, another format version, a missing group or variable,
-        another geometry than the running atlas, non-finite values, a checksum that does not fit;
-        the message names the file and the reason.
+        If the file is missing, truncated or of another program, has another format version or
+        geometry, lacks a group or variable, has values that are not finite, or a checksum that does
+        not fit.  The message names the file and the reason.
     """
     return parse_table(read_image(path), path)
 
 
 def parse_table(image: bytes, path: str | Path) -> Table:
-    """Read a table as :func:`read_table`, from the bytes of the file; ``path`` names it in
-    errors."""
+    """Read a table as :func:`read_table` does, from the bytes of the file; errors name ``path``."""
     try:
         table = _read(hdf5.File(image, MOST_NUMBERS, MOST_IN_ALL))
         digest = _digest(table)
@@ -500,8 +502,8 @@ def parse_table(image: bytes, path: str | Path) -> Table:
 
 
 def read_image(path: str | Path) -> bytes:
-    """Return the bytes of a table file; TableError where it is missing, unreadable, or larger than
-    any table."""
+    """Return the bytes of a table file.  Raise TableError if it is missing, unreadable, or larger
+    than any table."""
     path = Path(path)
     try:
         if not path.is_file():
@@ -516,7 +518,7 @@ def read_image(path: str | Path) -> bytes:
 
 
 def json_attributes(table: Table) -> dict[str, object]:
-    """Return root attributes as plain Python numbers, lists and strings; ``builder_options``
+    """Return root attributes as plain Python numbers, lists and strings, with ``builder_options``
     parsed."""
     out = {
         key: value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value

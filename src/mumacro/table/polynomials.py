@@ -1,9 +1,9 @@
-"""From the Chebyshev nodes of the file to the cells of the evaluation; and the value of one cell.
+"""Compute cells for the evaluation from the Chebyshev nodes of the file, and the value of one cell.
 
-The file holds the values at tensor-product Chebyshev points of the first kind: no node is on an
+The file holds the values at tensor-product Chebyshev points of the first kind.  No node is on an
 edge, where a solve would be ill conditioned, and the interpolant is the near-best polynomial on the
-closed rectangle.  Every block is cut into cells; each cell holds a polynomial of degree 7 in both
-local coordinates u, w in [-1, 1] as power-basis coefficients.
+closed rectangle.  Every block is cut into cells.  Each cell holds a polynomial of degree 7 in both
+local coordinates u, w in [-1, 1], as power-basis coefficients.
 """
 
 import functools
@@ -22,8 +22,8 @@ from mumacro.table.blocks import BorderPiece, TabulatedContact
 
 WIDTH = 8  # coefficients of a cell along each coordinate: one vector
 
-# Chebyshev points of one cell and the matrix that takes values there to power-basis coefficients,
-# highest power first
+# Chebyshev points of one cell, and the matrix from values at these points to power-basis
+# coefficients, highest power first
 LOCAL = -np.cos((np.arange(WIDTH) + 0.5) * np.pi / WIDTH)
 _TO_POWERS: Array = np.linalg.inv(np.vander(LOCAL, WIDTH))
 
@@ -35,9 +35,10 @@ def nodes(n: int, low: float, high: float) -> Array:
 
 
 def coefficient_matrix(n: int) -> Array:
-    """Return matrix (n, n) from values at ``n`` :func:`nodes` to the Chebyshev coefficients of the
-    interpolant."""
-    # the angle in whole parts of a turn: rounding it is seen in second derivatives at the edges
+    """Return the matrix (n, n) from values at ``n`` :func:`nodes` to the Chebyshev coefficients of
+    the interpolant."""
+    # the angle as a fraction of a turn in whole numbers: its rounding error would be visible in
+    # second derivatives at the edges
     parts = np.outer(np.arange(n), 2 * np.arange(n, 0, -1) - 1) % (4 * n)
     matrix = 2.0 / n * np.cos(np.pi * parts / (2 * n))
     matrix[0] *= 0.5
@@ -45,8 +46,8 @@ def coefficient_matrix(n: int) -> Array:
 
 
 def chebyshev_coefficients(values: Array) -> Array:
-    """Return Chebyshev coefficients of the interpolant through ``values`` at :func:`nodes`, along
-    every axis."""
+    """Return the Chebyshev coefficients of the interpolant through ``values`` at :func:`nodes`,
+    along every axis."""
     out = np.asarray(values, dtype=np.float64)
     for axis in range(out.ndim):
         matrix = coefficient_matrix(out.shape[axis])
@@ -58,13 +59,13 @@ def chebyshev_coefficients(values: Array) -> Array:
 
 
 def interpolation_matrix(n: int, t: Array) -> Array:
-    """Return matrix (len(t), n) from Chebyshev coefficients to values at ``t`` in [-1, 1]."""
+    """Return the matrix (len(t), n) from Chebyshev coefficients to values at ``t`` in [-1, 1]."""
     return np.asarray(chebyshev.chebvander(t, n - 1), dtype=np.float64)
 
 
 def _count(axis: Axis, cells: int) -> tuple[float, float]:
-    """Return (offset, step) with which step * coordinate + offset counts cells from 0; its whole
-    part is the cell.
+    """Return (offset, step): step * coordinate + offset counts cells from 0, and its whole part is
+    the index of the cell.
 
     The far end is slightly below ``cells``, so that it belongs to the last cell.
     """
@@ -74,7 +75,7 @@ def _count(axis: Axis, cells: int) -> tuple[float, float]:
 
 
 def cells_1d(piece: int, values: Array, cells: int) -> Array:
-    """Return power-basis coefficients (cells, WIDTH), highest power first, of a piece of v~crit
+    """Return the power-basis coefficients (cells, WIDTH), highest power first, of a piece of v~crit
     with node ``values`` (n,)."""
     x, positions = atlas.BORDER_PIECES[piece][1].cell_positions(cells, LOCAL)
     local = (
@@ -86,8 +87,8 @@ def cells_1d(piece: int, values: Array, cells: int) -> Array:
 
 
 def cell_scale(piece: int, x: Array) -> Array:
-    """Return factor from node values to cell values of a piece of v~crit, at its coordinate ``x``
-    (n,)."""
+    """Return the factor from node values to cell values of a piece of v~crit, at its coordinate
+    ``x`` (n,)."""
     with np.errstate(divide="ignore", invalid="ignore"):  # both are infinite at y~ = infinity
         of_nodes, of_cells = kernels[-1].border_scales(
             piece, atlas.BORDER_PIECES[piece][1].amplitude(x)
@@ -96,9 +97,9 @@ def cell_scale(piece: int, x: Array) -> Array:
 
 
 def _to_powers(local: Array) -> Array:
-    """Return power-basis coefficients, highest power first, of values (cells, WIDTH) at the points
-    of each cell."""
-    # the mean apart: the change of basis multiplies rounding errors by a hundred
+    """Return the power-basis coefficients, highest power first, of values (cells, WIDTH) at the
+    points of each cell."""
+    # without the mean, because the change of basis multiplies rounding errors by a hundred
     mean = local.mean(axis=1)
     out: Array = np.ascontiguousarray((local - mean[:, None]) @ _TO_POWERS.T)
     out[:, -1] += mean
@@ -106,7 +107,7 @@ def _to_powers(local: Array) -> Array:
 
 
 def cells_2d(a: Axis, b: Axis, values: Array, cells: tuple[int, int]) -> Array:
-    """Return power-basis coefficients (cells along a * cells along b, WIDTH, WIDTH) of node
+    """Return the power-basis coefficients (cells along a * cells along b, WIDTH, WIDTH) of node
     ``values`` (n_a, n_b).
 
     Axis 1 counts powers of the b coordinate, axis 2 powers of the a coordinate, both from 7 down to
@@ -117,8 +118,9 @@ def cells_2d(a: Axis, b: Axis, values: Array, cells: tuple[int, int]) -> Array:
 
 
 def _patches(on_a: Array, on_b: Array, values: Array) -> Array:
-    """Return :func:`cells_2d`, from the positions of the cells' points on both axes of nodes."""
-    # Cell by cell: for larger products BLAS starts threads, which take more time than they save.
+    """Return :func:`cells_2d` from the positions of the cells' points on both axes of nodes."""
+    # Cell by cell, because for larger products BLAS starts threads, which take more time than they
+    # save.
     along_a, along_b = (
         interpolation_matrix(n, positions).reshape(-1, WIDTH, n)
         for positions, n in zip((on_a, on_b), values.shape, strict=True)
@@ -131,8 +133,8 @@ def _patches(on_a: Array, on_b: Array, values: Array) -> Array:
 
 
 def _join_patches(patches: Sequence[Array]) -> Array:
-    """Return the patches (.., WIDTH, WIDTH) of all blocks as one array that starts on a cache line:
-    a row lies in one."""
+    """Return the patches (.., WIDTH, WIDTH) of all blocks as one array that starts on a cache line,
+    so that a row lies in one cache line."""
     shape = (sum(p.shape[0] for p in patches), WIDTH, WIDTH)
     raw = np.empty(math.prod(shape) + WIDTH)
     skip = (-raw.ctypes.data % 64) // 8
@@ -140,7 +142,7 @@ def _join_patches(patches: Sequence[Array]) -> Array:
 
 
 def border_cells(pieces: Sequence[BorderPiece]) -> tuple[Array, Array]:
-    """Return the stored border for evaluation: coefficients (cells, WIDTH), and a row for each
+    """Return the stored border for the evaluation: coefficients (cells, WIDTH), and a row for each
     piece."""
     coefficients, rows, first = [], np.zeros(len(pieces), PIECE_ROW), 0
     rows["error"] = max(piece.max_rel_error for piece in pieces)
@@ -153,7 +155,8 @@ def border_cells(pieces: Sequence[BorderPiece]) -> tuple[Array, Array]:
 
 
 def block_rows(contact: TabulatedContact) -> Array:
-    """Return the geometry of the blocks for evaluation: a row for each source, and one for none."""
+    """Return the geometry of the blocks for the evaluation: a row for each source, and a last row
+    for no source."""
     rows, first = np.zeros(len(atlas.SOURCES) + 1, BLOCK_ROW), 0
     for row, chart, block in zip(rows, contact.charts, contact.blocks, strict=False):
         na, nb = block.cells
@@ -186,7 +189,7 @@ def quantity_cells(contact: TabulatedContact, code: int) -> tuple[Array, Array, 
     ):
         cells = block.cells[0] * block.cells[1]
         nodes = block.nodes.get(name)
-        # zero where the block does not tabulate the quantity
+        # zero if the block does not tabulate the quantity
         patches.append(
             np.zeros((cells, WIDTH, WIDTH)) if nodes is None else _patches(*on_axes, nodes)
         )
@@ -199,7 +202,7 @@ def quantity_cells(contact: TabulatedContact, code: int) -> tuple[Array, Array, 
 
 @functools.cache
 def outer_cells() -> Array:
-    """Return coefficients (cells, 2, WIDTH) of f and g + r f'/2 of the limit of large speed, in
+    """Return the coefficients (cells, 2, WIDTH) of f and g + r f'/2 of the limit of large speed, in
     cells of ln (1 + r^2)."""
     kernel = kernels[-1]
     cells, top = kernel.atlas.outer_cells, kernel.atlas.outer_log_max
@@ -209,11 +212,11 @@ def outer_cells() -> Array:
 
 
 class Border:
-    """The border of continuous sliding, v~crit(y~): the stored curve inside, its limits at both
-    ends.
+    """Evaluate the border of continuous sliding, v~crit(y~): the stored curve, and its limits at
+    both ends.
 
     ``arrays`` are what the kernel reads, see :func:`border_cells`; ``max_rel_error`` bounds the
-    stored curve's error.
+    error of the stored curve.
     """
 
     def __init__(self, pieces: Sequence[BorderPiece]) -> None:
