@@ -101,7 +101,8 @@ def _parser() -> OneLineParser:
 
 
 def main(words: Sequence[str]) -> int:
-    """Run ``mumacro eval`` and return the exit code. :func:`mumacro.cli.common.run` reports errors."""
+    """Run ``mumacro eval`` and return the exit code. :func:`mumacro.cli.common.run` reports
+    errors."""
     options = _parser().parse_intermixed_args(words)
     surrogate = open_table(options.table)
     console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)

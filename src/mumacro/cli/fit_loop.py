@@ -1,4 +1,5 @@
-"""Run ``mumacro fit-loop``: fit k and mu0 to a measured loop of force over displacement in a file."""
+"""Run ``mumacro fit-loop``: fit k and mu0 to a measured loop of force over displacement in a
+file."""
 
 import argparse
 import sys

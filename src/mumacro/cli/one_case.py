@@ -14,7 +14,8 @@ EXAMPLE = "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz v0=10mm/s"
 
 
 def run(words: Sequence[str], description: str) -> str:
-    """Run ``mumacro "mu0=0.3 ..."``; ``description`` is the text of the help for the whole command."""
+    """Run ``mumacro "mu0=0.3 ..."``; ``description`` is the text of the help for the whole
+    command."""
     parser = OneLineParser(prog="mumacro", description=description + common.ABOUT_INPUTS)
     common.add_case(parser, "the six inputs, quoted together or apart")
     common.add_include(parser)

@@ -64,7 +64,8 @@ class Stiffening(NamedTuple):
         return math.exp(min(max(power, -690.0), 690.0))
 
     def range(self, k: float) -> tuple[float, float]:
-        """Return the range of loads [N] in which both the load and k are well within double range."""
+        """Return the range of loads [N] in which both the load and k are well within double
+        range."""
         log_k, log_far = math.log(k), math.log(_FAR)
         low, high = (
             math.log(self.load) + (side * log_far - log_k) / self.exponent for side in (-1.0, 1.0)

@@ -134,7 +134,8 @@ class RowBlock(NamedTuple):
 
 
 class ParquetSource:
-    """Read Parquet; folders below ``folder`` that are named ``key=value`` give columns, as in Hive."""
+    """Read Parquet; folders below ``folder`` that are named ``key=value`` give columns, as in
+    Hive."""
 
     has_mark, sep, decimal = False, "", "."
 
@@ -171,7 +172,8 @@ class ParquetSource:
 
 
 class TextSource:
-    """Read tables as text whose headers name the same columns.  Raise FilesError if one does not."""
+    """Read tables as text whose headers name the same columns.  Raise FilesError if one does
+    not."""
 
     def __init__(
         self, files: Sequence[Path], dialect: Dialect, column_names: ColumnNames, to_text: bool

@@ -340,7 +340,8 @@ class _Loop:
         return np.asarray(slopes[self.counted] != 0.0)
 
     def _energy(self, linear: dict[str, float]) -> float:
-        """Return the work of the force over a whole cycle [J], the mean over the cycles that count."""
+        """Return the work of the force over a whole cycle [J], the mean over the cycles that
+        count."""
         if self.open:
             return math.nan
         force = self.force - self._line(linear)

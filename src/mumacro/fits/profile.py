@@ -108,7 +108,8 @@ class Profile:
         return self._limit_of(float(self.samples.chi2.min()))
 
     def sample(self, s: Array, slopes: bool = True) -> ProfileSamples:
-        """Return the curve at places ``s`` (m,); slopes and tilt are zero if ``slopes`` is False."""
+        """Return the curve at places ``s`` (m,); slopes and tilt are zero if ``slopes`` is
+        False."""
         rows, steps = self._model(s, slopes)
         squares = _dots(rows, rows)
         factor: Array = np.ones(s.size)

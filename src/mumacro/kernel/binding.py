@@ -355,7 +355,8 @@ class Kernel:
         part: slice,
         kind: tuple[int, int] = (0, 0),
     ) -> None:
-        """Evaluate intervals of k, from its column to ``high`` (n,), in the way of :meth:`cases`."""
+        """Evaluate intervals of k, from its column to ``high`` (n,), in the way of
+        :meth:`cases`."""
         start, n = part.start, part.stop - part.start
         six, ends = _columns_of(columns, start), _numbers(high) + start
         self._functions.intervals(data.pointer, *kind, n, six, ends, *_out(rows, start))
@@ -509,8 +510,8 @@ class Kernel:
         return of_nodes, of_cells
 
     def cell_shares(self, w: Array) -> tuple[Array, Array]:
-        """Return the error of derivatives at ``w``, (n,), relative to a cell's largest error: inside a
-        block, and in the last cell below the border."""
+        """Return the error of derivatives at ``w``, (n,), relative to the largest error of a cell:
+        inside a block, and in the last cell below the border."""
         inside, at_border = np.empty(w.size), np.empty(w.size)
         self._functions.cell_shares(
             w.size, *map(_numbers, (np.ascontiguousarray(w), inside, at_border))

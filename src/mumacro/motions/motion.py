@@ -104,7 +104,8 @@ NUMBERS = {
 
 @dataclass(frozen=True)
 class Scenes:
-    """Hold the inputs of n cases: columns (n,) in SI, and harmonics of x, y and the normal force."""
+    """Hold the inputs of n cases: columns (n,) in SI, and harmonics of x, y and the normal
+    force."""
 
     columns: dict[str, Array]  #: mu0, Fz, k, omega, v0
     terms: tuple[tuple[Term, ...], ...]

@@ -248,7 +248,8 @@ class MotionCurve:
                 self.case[name] = self.number(name)
 
     def opposite(self) -> "MotionCurve":
-        """Return the same motion with x shifted by half a period: it moves the body the other way."""
+        """Return the same motion with x shifted by half a period: it moves the body the other
+        way."""
         terms = read_oscillation("x", self.case["x"])
         opposite = [(order, amplitude, phase + 180.0) for order, amplitude, phase in terms]
         return MotionCurve(self.unknown, self.of, {**self.case, "x": opposite})

@@ -58,7 +58,8 @@ class Evaluated:
             self._over_interval()
 
     def _over_interval(self) -> None:
-        """Compute the smallest and largest mu_macro over the interval, and the largest bound in it."""
+        """Compute the smallest and largest mu_macro over the interval, and the largest bound in
+        it."""
         low, high, bound = self.tabulated.extremes(self.cases)
         take = np.ravel if self.cases.shape else _item
         # an interval of one point, or a rigid contact, may have no result of the kernel
@@ -79,7 +80,8 @@ class Evaluated:
 
     @cached_property
     def usable(self) -> Any:
-        """Return whether the contact is elastic and oscillates, with v~ and y~ within double range."""
+        """Return whether the contact is elastic and oscillates, with v~ and y~ within double
+        range."""
         return (self.y_tilde < math.inf) & self.moving
 
     def quantity(self, name: str, v: Any, y: Any, kind: Any = None) -> tuple[Any, Any]:

@@ -8,7 +8,8 @@ from mumacro.outputs.evaluated import Evaluated, where
 
 
 def limits(cases: Evaluated) -> Values:
-    """Return mu_macro at rest, the speed at the border of continuous sliding, and mu_macro there."""
+    """Return mu_macro at rest, the speed at the border of continuous sliding, and mu_macro
+    there."""
     omega = cases.columns["omega"]
     # the speed below which the contact slides backwards during a part of the period
     if DIRECTIONS[cases.kind.direction] == "along":

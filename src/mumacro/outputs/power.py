@@ -86,7 +86,8 @@ def _at_the_ends(cases: Evaluated, here: Any, *of_table: Any) -> tuple[Array, Ar
 
 
 def _product(factors: tuple[Array, ...], divisors: tuple[Array, ...] = ()) -> Array:
-    """Return a product, rounded to double range at the end, though its parts may leave this range."""
+    """Return a product, rounded to double range at the end, though its parts may leave this
+    range."""
     mantissa, exponent = np.ones(factors[0].size), np.zeros(factors[0].size, np.int64)
     for x in factors:
         part, power_of_two = np.frexp(x)
