@@ -1,13 +1,13 @@
-"""Admission: what one process takes on at the same time, decided here and nowhere else.
+"""Decide what one process takes on at the same time, here and nowhere else.
 
-A request passes three gates.  *Before its body is read*, the bytes of all bodies are counted as
-they are received.  *Before it is computed*, when its cost is known, it takes a slot: it waits a
-little for one, or is refused with the time after which to ask again.  *While it is computed*, in a
-thread of its own, its time limit, a client that has gone and the stop of the service end it.
+A request passes three gates. *Before its body is read*, the bytes of all bodies are counted as they
+arrive. *Before it is computed*, when its cost is known, it needs a slot: it waits a short time for
+one, or is refused with the time after which to ask again. *While it is computed*, in its own
+thread, three things end it: its time limit, a client that has gone, and the stop of the service.
 
-Of bytes, slots and places in the queue one client has at most half while another one has asked in
-the last ten seconds, and never the last part, so that whoever comes next finds some.  A client is
-the holder of a key, else the address that trusted proxies give.
+One client has at most half of the bytes, slots and places in the queue while another client has
+asked in the last ten seconds.  It never has the last part of them, so that the next client finds
+some.  A client is the holder of a key, or else the address that trusted proxies report.
 
 A *cost*, here and in the models and routers, is the time of a computation divided by the time of
 mu_macro of one spring that is shaken across, one case of a long column.
@@ -39,29 +39,29 @@ from .security import HEALTH_PATHS
 from .settings import Settings
 
 T = TypeVar("T")
-#: the largest cost that is computed at once, without a slot: under half a millisecond
+#: largest cost that is computed at once, without a slot: less than half a millisecond
 AT_ONCE = 4000.0
-#: the largest cost that is not long, about 50 ms; long work has half of the slots
+#: largest cost that is not long, about 50 ms; long work has half of the slots
 LONG = 100.0 * AT_ONCE
-WAIT_S = 2.0  # for a slot, at most
-_MOST_WAITING = 64  # requests that wait for a slot
-_RECENTLY_S = 10.0  # for so long a client that has asked counts as another one
-# added to the niceness of a thread of long work, so that short requests are answered first
+WAIT_S = 2.0  # longest wait for a slot
+_MOST_WAITING = 64  # largest number of requests that wait for a slot
+_RECENTLY_S = 10.0  # for this time a client that has asked counts as another one
+# added to the niceness of a thread with long work, so that short requests are answered first
 _NICENESS = 5
-_TICKET = "mumacro.ticket"  # in the scope of a request that holds something
+_TICKET = "mumacro.ticket"  # key in the scope of a request that holds something
 _log = logging.getLogger("mumacro.admission")
 
 
-_threads = WeakSet[threading.Thread]()  # of work
+_threads = WeakSet[threading.Thread]()  # threads that do work
 
 
 class Thread(Generic[T]):
-    """Work in a thread of its own, which does not keep the process alive; RuntimeError where none
-    can start."""
+    """Do work in its own thread, which does not keep the process alive.  Raise RuntimeError if no
+    thread can start."""
 
     def __init__(self, work: Callable[[], T], niceness: int = 0) -> None:
         self.stop, self._loop = Stop(), asyncio.get_running_loop()
-        #: what the work returns or raises
+        #: result of the work: its return value or its exception
         self.done: asyncio.Future[T] = self._loop.create_future()
         arguments = work, niceness
         thread = threading.Thread(target=self._run, args=arguments, name="work", daemon=True)
@@ -69,7 +69,7 @@ class Thread(Generic[T]):
         _threads.add(thread)
 
     def _run(self, work: Callable[[], T], niceness: int) -> None:
-        if niceness and sys.platform == "linux":  # where that is of the thread
+        if niceness and sys.platform == "linux":  # on Linux niceness belongs to the thread
             os.nice(niceness)
         try:
             with self.stop.of_this_thread():
@@ -82,11 +82,11 @@ class Thread(Generic[T]):
 
     def _end(self, tell: Callable[[], None]) -> None:
         tell()
-        self.done.exception()  # nobody may wait for it any more
+        self.done.exception()  # perhaps nobody waits for it any more
 
 
 def join_threads(seconds: float) -> bool:
-    """Wait for so long until all work has ended; return whether it has."""
+    """Wait up to this time until all work has ended, and return whether it has."""
     end = time.monotonic() + seconds
     for thread in [*_threads]:
         thread.join(max(0.0, end - time.monotonic()))
@@ -94,7 +94,7 @@ def join_threads(seconds: float) -> bool:
 
 
 class _Waiting(NamedTuple):
-    """A request that waits for a slot."""
+    """Hold a request that waits for a slot."""
 
     client: str
     is_long: bool
@@ -102,7 +102,7 @@ class _Waiting(NamedTuple):
 
 
 class Admission:
-    """What the requests of one process hold together: bytes, slots, places in the queue."""
+    """Hold what the requests of one process use together: bytes, slots, places in the queue."""
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
@@ -112,16 +112,17 @@ class Admission:
         self.queue: list[_Waiting] = []
         self.running: set[Thread[Any]] = set()
         self.is_stopping = False
-        self.stops_at = math.inf  # the end of the grace, on the loop's clock
-        #: how many connections are open, as our own server says
+        self.stops_at = math.inf  # the end of the grace period, on the loop's clock
+        #: number of open connections, as our own server reports it
         self.connections: Callable[[], int] = lambda: 0
-        self._seconds = 0.1  # that a slot is held, in the mean of the last ones
-        # the client that asked last, and the last other one, each with the time
+        self._seconds = 0.1  # mean time for which the last slots were held
+        # the client that asked last, and the last client that was a different one, each with the
+        # time
         self._last = self._before = ("", -math.inf)
 
     @property
     def slots(self) -> int:
-        """How many slots are taken."""
+        """Return how many slots are taken."""
         return self._slots_of.total()
 
     def see(self, client: str) -> None:
@@ -131,7 +132,7 @@ class Admission:
         self._last = client, asyncio.get_running_loop().time()
 
     def _share(self, client: str, whole: int) -> int:
-        """Return what one client may have of a whole."""
+        """Return how much of a whole one client may have."""
         _, moment = self._before if self._last[0] == client else self._last
         is_alone = asyncio.get_running_loop().time() - moment > _RECENTLY_S
         return max(1, whole - max(1, whole // 8) if is_alone else whole // 2)
@@ -139,7 +140,7 @@ class Admission:
     # --- bytes ------------------------------------------------------------------------------------
 
     def weigh(self, client: str, added: int) -> None:
-        """Refuse a body for whose bytes there is no room."""
+        """Refuse a body if there is no room for its bytes."""
         most = self.settings.max_held_bytes
         if self.held_bytes + added > most:
             part = f"all requests together may have {most} bytes"
@@ -150,7 +151,7 @@ class Admission:
         raise self._overloaded(f"the bodies of {part}, and this one is too much beside the others")
 
     def hold(self, client: str, added: int) -> None:
-        """Count bytes that are received, or that are gone."""
+        """Count bytes that were received (or, with a negative number, released)."""
         self.held_bytes += added
         self._bytes_of[client] += added
         if not self._bytes_of[client]:
@@ -174,7 +175,7 @@ class Admission:
                 del counter[client]
 
     async def take(self, client: str, is_long: bool) -> None:
-        """Take a slot, for which a request waits a little."""
+        """Take a slot; wait a short time for one."""
         if self.is_stopping:
             raise RequestError(ProblemKind.OVERLOADED, "the service stops")
         if self._is_room(client, is_long):
@@ -198,8 +199,8 @@ class Admission:
             raise self._overloaded(f"no computation has ended within {WAIT_S:g} s")
 
     def give_back(self, client: str, is_long: bool, seconds: float | None = None) -> None:
-        """Give a slot back that was held for some seconds: to the request that has waited longest
-        among those of the clients with the fewest slots."""
+        """Give a slot back that was held for some seconds.  It goes to the clients with the fewest
+        slots, and among their requests to the one that has waited longest."""
         self._count(client, is_long, -1)
         if seconds is not None:
             self._seconds += 0.1 * (seconds - self._seconds)
@@ -210,8 +211,8 @@ class Admission:
             one.admitted.set_result(None)
 
     def _overloaded(self, detail: str) -> RequestError:
-        """Return the refusal with the time after which there will be room: what is waiting and
-        running has ended then, if it takes as long as the last computations."""
+        """Return the refusal, with the time after which there will be room: the work that waits and
+        runs has then ended, if it takes as long as the last computations."""
         self.refused += 1
         rounds = 1 + len(self.queue) / self.settings.max_computations
         seconds = min(max(1, math.ceil(rounds * self._seconds)), self.settings.compute_limit_s)
@@ -220,35 +221,35 @@ class Admission:
     # --- the end ----------------------------------------------------------------------------------
 
     def begin_stop(self) -> None:
-        """Refuse new work, and end what is running when the grace is over."""
+        """Refuse new work, and end the running work when the grace period is over."""
         if not self.is_stopping:
             self.is_stopping, loop = True, asyncio.get_running_loop()
             self.stops_at = loop.time() + self.settings.shutdown_grace_s
             loop.call_at(self.stops_at, self.end)
 
     def end(self) -> None:
-        """Ask all that is running to end."""
+        """Ask all running work to end."""
         for thread in self.running:
             thread.stop.set()
 
 
 class Ticket:
-    """What one request holds, until it is answered: the bytes of its body, and a slot."""
+    """Hold what one request uses until it is answered: the bytes of its body, and a slot."""
 
     def __init__(self, scope: Scope) -> None:
         self.admission: Admission = scope["app"].state.admission
         self.client, self._bytes, self._scope = client_of(scope), 0, scope
-        self._slot: bool | None = None  # whether it is one of long work
+        self._slot: bool | None = None  # whether it is a slot of long work
         self._since = 0.0
         self._left: float = self.admission.settings.compute_limit_s
         self.admission.see(self.client)
 
     def weigh(self, size: int) -> None:
-        """Refuse a body that will have this size, if there is no room for it."""
+        """Refuse a body of this size if there is no room for it."""
         self.admission.weigh(self.client, size - self._bytes)
 
     def hold(self, size: int) -> None:
-        """Hold a body of this size; 0 gives it back."""
+        """Hold a body of this size; 0 releases it."""
         self.admission.hold(self.client, size - self._bytes)
         self._bytes = size
 
@@ -270,9 +271,10 @@ class Ticket:
             self._slot = None
 
     async def run(self, work: Callable[[], T], cost: float, receive: Receive) -> T:
-        """Do work in a thread, with a slot, which is kept.
+        """Do work in a thread, with a slot.  The request keeps the slot.
 
-        The time limit and a client that has gone end it; the slot is given back when it has ended.
+        The time limit, or a client that has gone, ends the work; the slot is given back when the
+        work has ended.
         """
         await self._take(cost > LONG)
         loop, admission = asyncio.get_running_loop(), self.admission
@@ -306,13 +308,13 @@ class Ticket:
 
 
 async def _gone(receive: Receive) -> None:
-    """Wait until the client has gone; the body has been received."""
+    """Wait until the client has gone; its body has already been received."""
     while (await receive())["type"] != "http.disconnect":
         pass
 
 
 def client_of(scope: Scope) -> str:
-    """Return who asks: the holder of a key, else an address, of IPv6 the network that one site
+    """Return who asks: the holder of a key, or else an address; for IPv6 the network that one site
     has."""
     if holder := scope.get("key_holder"):
         return f"key {holder}"
@@ -324,7 +326,7 @@ def client_of(scope: Scope) -> str:
 
 
 def ticket_of(scope: Scope) -> Ticket:
-    """Return the ticket of a request, which :class:`Admitted` takes back."""
+    """Return the ticket of a request; :class:`Admitted` takes it back."""
     ticket: Ticket | None = scope.get(_TICKET)
     if ticket is None:
         ticket = scope[_TICKET] = Ticket(scope)
@@ -332,7 +334,7 @@ def ticket_of(scope: Scope) -> Ticket:
 
 
 async def compute(request: Request, work: Callable[[], T], cost: float = 0.0) -> T:
-    """Do the work of a request, which costs more than is done at once."""
+    """Do the work of a request in a thread, if its cost is too large to do it at once."""
     ticket = ticket_of(request.scope)
     try:
         return await ticket.run(work, cost, request.receive)
@@ -341,8 +343,8 @@ async def compute(request: Request, work: Callable[[], T], cost: float = 0.0) ->
 
 
 class Admitted:
-    """Middleware: whatever a request holds is given back at its end.  While more connections are
-    open than the settings allow, only the probes are answered."""
+    """Give back everything that a request holds when it ends (middleware).  If more connections are
+    open than the settings allow, answer only the probes."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

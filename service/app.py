@@ -1,7 +1,7 @@
-"""The application: ``create_app(settings)`` builds it from settings, routers and middlewares.
+"""Build the application: ``create_app(settings)`` makes it from settings, routers and middlewares.
 
 The import of this module does no work.  ``uvicorn --factory service.app:create_app`` works: without
-an argument the settings are read from the environment.
+an argument the settings come from the environment.
 """
 
 import asyncio
@@ -66,23 +66,25 @@ _TAGS = [
     {"name": "table", "description": "The verified table that the answers come from"},
     {"name": "health", "description": "For those who run the service: probes and counters"},
 ]
-_LOOK_EVERY_S = 1.0  # seconds between two looks at what the process holds
-# For so long a thread that computes in Python keeps the others waiting, the loop among them; with
-# Python's own 5 ms a probe waited five times as long beside 200 batches (docs/operations.md).
+_LOOK_EVERY_S = 1.0  # seconds between two measurements of what the process holds
+# A thread that computes in Python keeps the other threads waiting for this time, including the
+# loop.  With Python's default of 5 ms a probe waited five times as long while 200 batches ran
+# (docs/operations.md).
 _SWITCH_S = 0.0005
-# Of glibc: blocks of at least this size are the system's again when they are freed, and so is the
-# free end of a heap.  Its own limits grow with what has been freed: six batches of 9 MB at a time
-# took 230 MB and left 120 MB in the heaps of their threads, not 110 and 30 MB.
+# For glibc: a freed block of at least this size goes back to the system, and so does the free end
+# of a heap. glibc's own limits grow with the size of freed blocks: with them six batches of 9 MB at
+# a time took 230 MB and left 120 MB in the heaps of their threads, instead of 110 and 30 MB.
 _OF_SYSTEM, _FREE_END = 2**20, 2**21
-_M_MMAP_THRESHOLD, _M_TRIM_THRESHOLD = -3, -1  # as malloc.h has them
-# held while a description is made: FastAPI cannot make two at the same time
+_M_MMAP_THRESHOLD, _M_TRIM_THRESHOLD = -3, -1  # as in malloc.h
+# held while a description is made, because FastAPI cannot make two at the same time
 _DESCRIBING = threading.Lock()
-_END_S = 1.6  # after the grace, or a stop without requests, until all that is computed has ended
+# time after the grace period (or after a stop without requests) until all work has ended
+_END_S = 1.6
 _log = logging.getLogger("mumacro.app")
 
 
 def see_now(state: State) -> None:
-    """Tell the metrics what this process holds now."""
+    """Update the metrics with what this process holds now."""
     admission, lines = state.admission, LogLines.running
     state.metrics.now(
         connections=admission.connections(),
@@ -102,7 +104,7 @@ async def _look(state: State) -> None:
 
 
 def _bound_heaps() -> None:
-    """Let memory that large bodies have taken go back to the system, where this is glibc."""
+    """Let memory that large bodies have used go back to the system, if the system has glibc."""
     set_option = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
     if set_option is not None:
         set_option(_M_MMAP_THRESHOLD, _OF_SYSTEM)
@@ -117,12 +119,12 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Any]]:
     _bound_heaps()
     app.state.tables.load()
     app.state.metrics.start(app.state.tables)
-    # A full collection visits a hundred thousand objects of the libraries, and no request is
-    # answered meanwhile.
+    # A full collection visits a hundred thousand objects of the libraries, and meanwhile no request
+    # is answered.
     gc.collect()
     gc.freeze()
-    # The description takes half as long as the rest of the start; FastAPI keeps it, and no request
-    # waits until it is made.
+    # Making the description takes half as long as the rest of the start.  FastAPI keeps it, so no
+    # request has to wait for it.
     Thread(app.openapi)
     state = app.state
     looking = asyncio.create_task(_look(state))
@@ -132,10 +134,11 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[dict[str, Any]]:
 
 
 async def _end(admission: Admission) -> None:
-    """End all work; in time, whatever a thread waits for, such as a file system that hangs.
+    """End all work within a fixed time, even if a thread waits for something such as a hanging file
+    system.
 
-    Where Python ends beside a thread in compiled code, such as pydantic's, the process aborts.  So
-    beside a thread that does not end it is left at once, but within another server's process.
+    If Python ends while a thread is in compiled code, such as pydantic's, the process aborts.  So
+    if a thread does not end, leave the process at once, unless it belongs to another server.
     """
     admission.end()
     now = asyncio.get_running_loop().time()
@@ -147,21 +150,22 @@ async def _end(admission: Admission) -> None:
 
 
 class Service(FastAPI):
-    """FastAPI within middlewares of our own alone, the one that was added last outermost.
+    """Run FastAPI within our own middlewares only; the one that was added last is the outermost.
 
-    :class:`Failures` answers every exception.  Starlette has two middlewares for that, and wraps
+    :class:`Failures` answers every exception.  Starlette has two middlewares for this, and wraps
     every endpoint once more (docs/decisions.md).
     """
 
     def build_middleware_stack(self) -> ASGIApp:
         """Put the router within the middlewares; Starlette calls this once, at the start."""
-        app: ASGIApp = AsyncExitStackMiddleware(self.router)  # which FastAPI's own routes need
+        app: ASGIApp = AsyncExitStackMiddleware(self.router)  # FastAPI's own routes need it
         for cls, args, kwargs in reversed(self.user_middleware):
             app = cls(app, *args, **kwargs)
         return app
 
     def openapi(self) -> dict[str, Any]:
-        """Describe the interface, as FastAPI does, with what it cannot know; made once."""
+        """Return the description of the interface: FastAPI's, with what FastAPI cannot know; it is
+        made once."""
         with _DESCRIBING:
             schema: dict[str, Any] = self.openapi_schema or _described(self)
             self.openapi_schema = schema
@@ -169,7 +173,7 @@ class Service(FastAPI):
 
 
 class HeadAsGet:
-    """Middleware: HEAD is answered as GET, without the body."""
+    """Answer HEAD as GET, without the body (middleware)."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -187,17 +191,17 @@ class HeadAsGet:
             if message["type"] == "http.response.start":
                 closes = (b"connection", b"close") in message["headers"]
                 await send(message)
-                if not closes:  # at once: the client may already send its next request
+                if not closes:  # at once, because the client may already send its next request
                     await send({"type": "http.response.body", "body": b""})
-            elif closes:  # when the rest of the request is read
+            elif closes:  # when the rest of the request has been read
                 await send({**message, "body": b""})
 
         await self._app({**scope, "method": "GET"}, receive, send_head)
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
-    """Return the application, whose tables are loaded when it starts; settings are read from the
-    environment if left out."""
+    """Return the application; it loads its tables when it starts.  By default the settings come
+    from the environment."""
     settings = load_settings() if settings is None else settings
     app = Service(
         title="mumacro",
@@ -205,15 +209,15 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         description=_DESCRIPTION,
         openapi_tags=_TAGS,
         servers=[{"url": settings.root_path}] if settings.root_path else None,
-        docs_url=None,  # the page of routers/page.py loads nothing from elsewhere
+        docs_url=None,  # the page of routers/page.py loads nothing from other hosts
         redoc_url=None,
         redirect_slashes=False,
         lifespan=_lifespan,
-        # it would ask for a provider of OpenTelemetry at every request
+        # FastAPI would ask for a provider of OpenTelemetry at every request
         telemetry={"tracing": False, "metrics": False, "logs": False},
     )
-    # include_router would look for the route of every request twice (docs/decisions.md); ours are
-    # looked for before FastAPI's own
+    # include_router would search for the route of every request twice (docs/decisions.md); our
+    # routes come before FastAPI's own
     app.router.routes[:0] = [route for one in (*ROUTERS, page.router) for route in one.routes]
     open_paths = {*HEALTH_PATHS, *page.OPEN}
     if settings.guide is not None:
@@ -256,7 +260,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
 
 def _methods_of_paths(app: FastAPI) -> dict[str, str]:
-    """Return path -> the methods that it is answered for, as in the header Allow."""
+    """Return path -> the methods that it accepts, as in the header Allow."""
     methods: dict[str, set[str]] = {}
     for route in app.routes:
         of_path = methods.setdefault(getattr(route, "path", ""), set())
@@ -266,14 +270,14 @@ def _methods_of_paths(app: FastAPI) -> dict[str, str]:
     return {path: ", ".join(sorted(of_path)) for path, of_path in methods.items()}
 
 
-#: models that are described by name only
+#: models that are described only by their name
 _MORE: Any = [(model, "validation") for model in (Case, CaseRequest, CaseColumns)]
 _MORE += [(model, "serialization") for model in (CaseAnswer, ColumnsAnswer, RowsAnswer, Problem)]
 
 
 def _without_default(member: dict[str, Any]) -> None:
-    """Say in words what a member is where it is left out: clients that are made from the
-    description require a member with a default."""
+    """Describe in words the value of a member that is left out, because clients that are generated
+    from the description require every member that has a default."""
     default = member.pop("default", None)
     if default is not None and "description" in member:
         default_text = default if isinstance(default, str) else orjson.dumps(default).decode()
@@ -281,7 +285,7 @@ def _without_default(member: dict[str, Any]) -> None:
 
 
 def _described(app: FastAPI) -> dict[str, Any]:
-    """Return FastAPI's description, with what it cannot know."""
+    """Return FastAPI's description, with what FastAPI cannot know."""
     document: dict[str, Any] = get_openapi(
         title=app.title,
         version=app.version,

@@ -1,9 +1,9 @@
-"""Many cases at once: one model of columns for columns and rows, answered slice by slice.
+"""Answer many cases at once: one model for columns and rows, evaluated slice by slice.
 
-``forms.py`` reads a body as numbers, lists and arrays by name; :class:`CaseColumns` checks them,
-and they become the library's ``Cases``, once; :class:`Batch` evaluates slices of these, so that
-memory stays small and other threads run between them; ``forms.py`` writes the slices.  A bad case
-spoils only itself.
+``forms.py`` reads a body as numbers, lists and arrays by name. :class:`CaseColumns` checks them,
+and they become the library's ``Cases`` once. :class:`Batch` evaluates slices of them, so that
+memory stays small and other threads can run between two slices; ``forms.py`` writes the slices.  A
+bad case affects only itself.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -30,7 +30,7 @@ from .tables import LoadedTable, Tables
 
 
 def body_and_query(members: Mapping[str, Any], options: BatchOptions) -> dict[str, Any]:
-    """Return what body and query say, each name once."""
+    """Return the members of body and query together; each name may occur once."""
     query = options.members
     if repeats := [name for name in query if members.get(name) is not None]:
         reason = "is given in the query and in the body"
@@ -40,8 +40,8 @@ def body_and_query(members: Mapping[str, Any], options: BatchOptions) -> dict[st
 
 @dataclass
 class Batch:
-    """Cases, and how they are answered.  ``errors``, ``n_errors`` and ``notes`` grow while the
-    slices are taken."""
+    """Hold cases and the options of their answers.  ``errors``, ``n_errors`` and ``notes`` grow as
+    the slices are evaluated."""
 
     table: LoadedTable
     cases: Cases
@@ -74,7 +74,7 @@ class Batch:
             if filled := [x for x in column if x is not None]:
                 raise other_amplitude(other, filled[0], model.kind)
             del values[other]  # a list of nulls
-        # the first bad input of a case, in the order of the inputs, is told
+        # only the first bad input of a case is reported, in the order of the inputs
         for name, column in [*values.items()]:
             if isinstance(column, Column):
                 values[name] = column.numbers
@@ -87,7 +87,7 @@ class Batch:
             reason = f"lists must have one length; given {text}"
             wrong = [name for name, length in lengths.items() if length != size]
             refuse([FieldFault.of(name, reason) for name in wrong])
-        if not lengths and "v0" in values:  # else it is refused below
+        if not lengths and "v0" in values:  # otherwise it is refused below
             values["v0"] = np.array([values["v0"]])
         cases = Cases.of(named(None, values))
         outputs = chosen(model.outputs, cases)
@@ -97,7 +97,7 @@ class Batch:
 
     @property
     def cost(self) -> float:
-        """The cost of all cases together, see :mod:`service.admission`."""
+        """Return the cost of all cases together, see :mod:`service.admission`."""
         return self.cases.size * cost(self.outputs, self.cases)
 
     def write(self) -> Iterator[bytes]:
@@ -109,7 +109,7 @@ class Batch:
         yield b"," + dump(end | self.table.signature)[1:]
 
     def _answers(self) -> Iterator[Answer[Any]]:
-        """Yield the answers, slice by slice; one empty slice if there is no case."""
+        """Yield the answers, slice by slice; yield one empty slice if there is no case."""
         for start in range(0, max(self.cases.size, 1), SLICE):
             part = self.cases.part(slice(start, start + SLICE))
             answer = self.table.surrogate.answer(part, self.outputs)

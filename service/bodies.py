@@ -1,8 +1,8 @@
-"""How a request becomes the model that its endpoint declares.
+"""Read a request as the model that its endpoint declares.
 
-:class:`DirectRoute` reads one model from body or query and solves nothing else: FastAPI's own
-reading of a case takes longer than its answer (docs/decisions.md).  A member or a parameter that is
-given twice is refused, numbers of a query are read as people type them, and limits hold.
+:class:`DirectRoute` reads one model from body or query and does nothing else, because FastAPI's own
+reading of a case takes longer than its answer (docs/decisions.md).  It refuses a member or a
+parameter that occurs twice, reads numbers in a query as people type them, and keeps the limits.
 """
 
 import asyncio
@@ -28,8 +28,8 @@ from .understood import UNDERSTOOD, understood
 T = TypeVar("T")
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 JSON = b"application/json"
-SMALL_BODY = 64 * 1024  # bytes of the body of a question, at most
-AT_ONCE = 16 * 1024  # bytes of a body that is checked without a thread, at most
+SMALL_BODY = 64 * 1024  # largest body of a question, in bytes
+AT_ONCE = 16 * 1024  # largest body that is checked without a thread, in bytes
 _BYTES_PER_UNIT = 1.0  # bytes of such a body whose check has the cost 1, see service/admission.py
 _CHARSETS = ("utf-8", "utf8", "us-ascii", "")  # US-ASCII is a part of UTF-8
 # the characters of a query that needs no decoding
@@ -41,7 +41,7 @@ _LISTS = frozenset(("include",))
 
 
 async def from_client(move: Awaitable[T], limit: int) -> T:
-    """Wait for the client to send or to read."""
+    """Wait until the client sends or reads."""
     try:
         async with asyncio.timeout(limit):
             return await move
@@ -51,7 +51,7 @@ async def from_client(move: Awaitable[T], limit: int) -> T:
 
 @asynccontextmanager
 async def within(limit: int) -> AsyncIterator[None]:
-    """Yield a time limit of a whole answer: its reading, computing and sending."""
+    """Limit the time of a whole answer: its reading, computing and sending."""
     try:
         async with asyncio.timeout(limit):
             yield
@@ -67,7 +67,8 @@ def _late(kind: ProblemKind, limit: int) -> RequestError:
 
 
 def only_json(headers: Mapping[bytes, bytes], remedy: str = "") -> None:
-    """Refuse a body that is not JSON in UTF-8, or is compressed; no Content-Type says JSON."""
+    """Refuse a body that is compressed or is not JSON in UTF-8.  A body without Content-Type counts
+    as JSON."""
     media_type = headers.get(b"content-type", JSON).lower()
     media, _, parameters = media_type.decode("latin-1").partition(";")
     if media.strip().encode() != JSON or not _is_utf8(parameters):
@@ -84,7 +85,7 @@ def only_json(headers: Mapping[bytes, bytes], remedy: str = "") -> None:
 
 
 def _is_utf8(parameters: str) -> bool:
-    """Return whether the parameters of a media type name no other character set.
+    """Return whether the parameters of a media type name no character set other than UTF-8.
 
     >>> _is_utf8('version=1; charset="UTF-8"'.lower()), _is_utf8("charset=latin-1")
     (True, False)
@@ -104,8 +105,8 @@ async def read_body(
     limit: int,
     scope: Scope,
 ) -> bytearray:
-    """Return the body of a request, which its ticket holds, unless it is small and there at once:
-    then it is answered before anything else is read."""
+    """Return the body of a request.  Its ticket holds the bytes, unless the body is small and
+    arrives at once; then it is answered before anything else is read."""
     length = headers.get(b"content-length", b"0").strip()
     size = int(length) if length.isdigit() and len(length) < 19 else limit + 1
     body, unfinished = bytearray(), True
@@ -136,7 +137,7 @@ async def read_body(
 
 
 async def small_body(request: Request) -> bytes:
-    """Return the bytes of a small JSON body, beside which there is no query."""
+    """Return the bytes of a small JSON body; refuse a query next to it."""
     headers = dict(request.scope["headers"])
     if headers.get(b"content-type") != JSON or b"content-encoding" in headers:
         only_json(headers)
@@ -159,7 +160,8 @@ async def small_body(request: Request) -> bytes:
 
 
 def members_of(query: bytes) -> dict[str, Any]:
-    """Return the parameters of a query as a body has them: numbers as numbers, others as texts."""
+    """Return the parameters of a query as a body has them: numbers as numbers, all others as
+    texts."""
     members: dict[str, Any] = {}
     repeats: dict[str, None] = {}
     for name, value in _pairs(query):
@@ -177,7 +179,7 @@ def members_of(query: bytes) -> dict[str, Any]:
 def _pairs(query: bytes) -> list[tuple[str, str]]:
     """Return names and values of a query."""
     text = query.decode("latin-1")
-    # what urllib would take longer to find
+    # a fast test; urllib would take longer
     if not query.translate(None, _PLAIN) and query.count(b"&") < 100:
         pairs = [pair.partition("=") for pair in text.split("&") if pair]
         return [(name, value) for name, _, value in pairs]
@@ -190,8 +192,8 @@ def _pairs(query: bytes) -> list[tuple[str, str]]:
 
 
 def _number(text: str) -> Any:
-    """Return a number where the text is one, else the text; an unescaped "+" of a query arrives as
-    a space."""
+    """Return a number if the text is one, otherwise the text.  An unescaped "+" of a query arrives
+    as a space."""
     if text.strip("0123456789.eE+- ") == "":
         try:
             number = float(text.replace("e ", "e+").replace("E ", "E+"))
@@ -205,20 +207,21 @@ def _number(text: str) -> Any:
 
 
 async def understood_in(request: Request, is_requested: bool) -> dict[str, Any]:
-    """Return the member of an answer with what was understood of a request in JSON, where it is
-    wanted."""
+    """Return the member of an answer that tells how the program understood the inputs in JSON, if
+    the request asks for it."""
     return {UNDERSTOOD: understood(decode(await request.body()))} if is_requested else {}
 
 
 class DirectRoute(APIRoute):
-    """A route for ``async def answer(request, model)``: the model is read straight from the bytes
-    of the body, or from the query.
+    """Handle ``async def answer(request, model)``: read the model directly from the bytes of the
+    body, or from the query.
 
-    Nothing else is solved: such an endpoint declares no dependency, and its path no parameter.
+    Nothing else is resolved: such an endpoint declares no dependency, and its path has no
+    parameter.
     """
 
     def get_route_handler(self) -> Handler:
-        """Take the place of FastAPI's handler."""
+        """Return the handler that replaces FastAPI's."""
         in_body = bool(self.dependant.body_params)
         parameter = (self.dependant.body_params or self.dependant.query_params)[0]
         model: Any = parameter.field_info.annotation
@@ -249,8 +252,8 @@ class DirectRoute(APIRoute):
 
 
 class Direct:
-    """Middleware: a request for a :class:`DirectRoute` goes straight to its handler.  The router
-    has the others, and these with another method."""
+    """Send a request for a :class:`DirectRoute` directly to its handler (middleware).  All other
+    requests, and other methods, go to the router."""
 
     def __init__(self, app: ASGIApp, routes: Iterable[BaseRoute]) -> None:
         self._app = app
@@ -284,14 +287,14 @@ def validated(model: Any, text: bytes) -> Any:
     try:
         instance = model.model_validate_json(text)
     except ValidationError as error:
-        # Python's reader has the reasons for what is no JSON, and for a member given twice
+        # Python's reader gives the reason if the text is not JSON or a member occurs twice
         members = decode(text)
         if not isinstance(members, dict):
             refuse([FieldFault((), "must be a JSON object", members)])
         if error.error_count() > 1 or error.errors()[0]["type"] != "json_invalid":
             raise invalid(error, model, members) from None
         return of_members(model, members)  # such as half of a surrogate pair
-    # one colon for each member: none is named twice, and there is no object within
+    # one colon for each member: no name occurs twice, and no object is nested
     if text.count(b":") != len(instance.model_fields_set):
         decode(text)
     return instance

@@ -1,7 +1,8 @@
-"""A batch: its body, columns or rows, becomes columns; the answers become JSON, piece by piece.
+"""Convert the body of a batch, columns or rows, to columns, and the answers to JSON, piece by
+piece.
 
-A body is weighed before it is decoded: every value but the first of its list or object has a comma
-before it, every list or object a bracket.
+The cost of a body is estimated before it is decoded: every value except the first of its list or
+object follows a comma, and every list or object has a bracket.
 """
 
 import math
@@ -35,13 +36,13 @@ from .models.inputs import INPUTS, MAX_REASONS, entry
 from .models.options import Case, CaseColumns
 from .problems import FieldFault, ProblemKind, RequestError, faults_of, reason_of, refuse
 
-#: the bad field, or None for the case as a whole, and why
+#: the bad field (None if the whole case is bad), and the reason
 Reason = tuple[str | None, str]
 
 MORE_CASES = "send several requests, or give `mumacro eval` a file, or use Dask"
-SLICE = 8192  # cases that are computed and written at a time
+SLICE = 8192  # number of cases that are computed and written at a time
 _NUMBERS = (*INPUTS, *DEVIATIONS)  # members that hold numbers
-_WORDS = {"contact": CONTACTS, "direction": DIRECTIONS}  # members that hold words, and which
+_WORDS = {"contact": CONTACTS, "direction": DIRECTIONS}  # members that hold words, and which words
 _REST = tuple(name for name in CaseColumns.model_fields if name not in _NUMBERS)
 _KNOWN = len(CaseColumns.model_fields)  # number of names that a case or its columns may have
 _REQUIRED = frozenset(name for name, about in Case.model_fields.items() if about.is_required())
@@ -49,11 +50,11 @@ _OPENS_LIST = re.compile(rb"[ \t\r\n]*\[")
 
 
 class Body(NamedTuple):
-    """What a body holds."""
+    """Hold the content of a body."""
 
-    #: inputs by name: one value, a list, or an array of numbers; and options
+    #: inputs by name (one value, a list, or an array of numbers) and options
     members: dict[str, Any]
-    #: why cases could not be read, by their index; they have a NaN
+    #: the reason for each case that could not be read, by its index; such a case has a NaN
     reasons: Mapping[int, Reason] = MappingProxyType({})
     rows: bool = False
 
@@ -68,8 +69,8 @@ def too_large(max_batch: int) -> RequestError:
 
 
 def read(text: bytearray, max_batch: int, words: Mapping[str, Any]) -> Body:
-    """Return the cases and the options of a body: an object of columns, or a list of rows;
-    ``words`` are contact, direction and deviations, where the query gives them for all rows."""
+    """Return the cases and the options of a body: an object of columns, or a list of rows.
+    ``words`` are contact, direction and deviations, if the query gives them for all rows."""
     most, objects = max_batch + 64, count(text, b"{")
     brackets = count(text, b"[")
     if max(objects, brackets) > most or count(text, b",") > _KNOWN * most:
@@ -95,16 +96,17 @@ def read(text: bytearray, max_batch: int, words: Mapping[str, Any]) -> Body:
 
 
 def _check_names(columns: Mapping[str, Any], words: Mapping[str, Any]) -> None:
-    """Raise InputError where the names of rows make no case."""
+    """Raise InputError if the names of the rows do not form a case."""
     ones = {name: column[:1] if name in KIND else np.ones(2) for name, column in columns.items()}
     Cases.of(named(None, {**ones, **words}))
 
 
 def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
-    """Return rows one by one; a bad one gets its first reason.
+    """Read rows one by one; a bad row gets its first reason.
 
-    Whether a row is a case is found fast, once for all rows of the same names; only where it is
-    none, and is listed, the model of a case looks for the reason, which takes ten times as long.
+    Whether a row is a case is decided quickly, once for all rows with the same names.  Only for a
+    row that is bad and is listed, the model of a case finds the reason, which takes ten times as
+    long.
     """
     columns: dict[str, Any] = {name: np.full(len(rows), np.nan) for name in (*ALL_FIELDS, *ENDS)}
     columns |= {name: np.zeros(len(rows)) for name in DEVIATIONS}
@@ -124,7 +126,7 @@ def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
         used |= numbers.keys()
         for name, found in words_of.items():
             found[row.get(name) or usual[name]] = None
-    if {*ENDS} <= used:  # a number is an interval of itself
+    if {*ENDS} <= used:  # one number is an interval of itself
         alone = np.isnan(columns["k_low"])
         for name in ENDS:
             columns[name][alone] = columns["k"][alone]
@@ -139,14 +141,15 @@ def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
     return Body(members, reasons, True)
 
 
-#: by name of a row's member the column that it goes into, and what one unit of it is there
+#: by the name of a row's member: the column of its value, and the scale of its unit there
 _Targets = dict[str, tuple[str, float]]
 
 
 def _targets_of(
     words: Mapping[str, Any], names: frozenset[str], contact: Any, direction: Any
 ) -> _Targets | None:
-    """Return where the numbers of a row with these names go; None where the names make no case."""
+    """Return the columns for the numbers of a row with these names, or None if the names do not
+    form a case."""
     if not (_REQUIRED <= names <= Case.model_fields.keys()) or names & words.keys():
         return None
     numbers = names - {*KIND}
@@ -164,14 +167,14 @@ def _targets_of(
 
 
 def _numbers_in(row: Any, targets_of: Callable[..., _Targets | None]) -> dict[str, float] | None:
-    """Return the numbers of a row by column; None where it is no case."""
+    """Return the numbers of a row by column, or None if the row is not a case."""
     if not isinstance(row, dict):
         return None
-    if None in row.values():  # left out, but for k, where it may mean rigid
+    if None in row.values():  # a null means left out, except in k, where it may mean rigid
         row = {name: x for name, x in row.items() if x is not None or name == "k"}
     try:
         targets = targets_of(frozenset(row), row.get("contact"), row.get("direction"))
-    except TypeError:  # a list is no word
+    except TypeError:  # a list is not a word
         return None
     if targets is None:
         return None
@@ -189,7 +192,7 @@ def _numbers_in(row: Any, targets_of: Callable[..., _Targets | None]) -> dict[st
 
 
 def _first_reason(row: Any, words: Mapping[str, Any]) -> Reason:
-    """Return the first fault of a row that is no case, in the order of the inputs."""
+    """Return the first fault of a row that is not a case, in the order of the inputs."""
     if not isinstance(row, dict):
         return None, "must be an object"
     if unknown := next((name for name in row if name not in Case.model_fields), None):
@@ -239,8 +242,10 @@ def _array(name: str, parts: Iterable[Any]) -> Iterator[bytes]:
 
 
 def write_rows(answers: Iterable[Answer[Any]]) -> Iterator[bytes]:
-    """Yield an object with the list ``results``, null for a bad case, without its closing brace."""
-    opening, rows = b'{"results":[', {-1: b"null"}  # by source code: a row with places for numbers
+    """Yield an object with the list ``results`` (null for a bad case), without its closing
+    brace."""
+    # by source code: a row with a place for each number
+    opening, rows = b'{"results":[', {-1: b"null"}
     for answer in answers:
         codes = answer.source_code.tolist()
         if new := {*codes} - rows.keys():
@@ -255,13 +260,13 @@ def write_rows(answers: Iterable[Answer[Any]]) -> Iterator[bytes]:
 
 
 def _row_of(columns: Mapping[str, Any], index: int) -> bytes:
-    """Return the row of a case as text, with a place for each number: the words follow from the
-    source."""
+    """Return the row of a case as text, with a place for each number.  The source determines the
+    words."""
     words = {path: "\0" if column is None else column[index] for path, column in columns.items()}
     return dump(nested(words)).replace(b"%", b"%%").replace(dump("\0"), b"%b")
 
 
 def listed(path: str, column: Any) -> list[Any]:
-    """Return a column as JSON lists it: NaN is written as null, and so is no text."""
+    """Return a column as JSON lists it: NaN and an empty text are written as null."""
     values: list[Any] = column.tolist()
     return [value or None for value in values] if path in TEXTS and "" in values else values

@@ -1,4 +1,4 @@
-"""The built documentation below ``/guide/``."""
+"""Serve the built documentation below ``/guide/``."""
 
 import base64
 import hashlib
@@ -13,13 +13,13 @@ from starlette.types import Scope
 
 
 class GuidePages(StaticFiles):
-    """Pages with a policy of their own; what begins with a dot is not there, and redirects name no
-    host."""
+    """Serve the pages with their own security policy.  A name that begins with a dot is not served,
+    and redirects do not name a host."""
 
     def __init__(self, directory: Path) -> None:
         super().__init__(directory=directory, html=True)
         hashes = "".join(sorted(f" 'sha256-{one}'" for one in set(_inline_scripts(directory))))
-        # inline styles are allowed: the theme sets some on elements
+        # inline styles are allowed, because the theme sets some on elements
         self._policy = (
             f"default-src 'none'; script-src 'self'{hashes}; style-src 'self' 'unsafe-inline'; "
             "img-src 'self' data:; font-src 'self'; connect-src 'self'; base-uri 'none'; "
@@ -39,7 +39,7 @@ class GuidePages(StaticFiles):
 
 
 def _inline_scripts(directory: Path) -> Iterator[str]:
-    """Yield the hashes of the scripts that stand in the pages themselves."""
+    """Yield the hashes of the scripts that are within the pages."""
     for page in directory.rglob("*.html"):
         for rest in page.read_text("utf-8", "replace").split("<script>")[1:]:
             script = rest.partition("</script>")[0].encode()

@@ -1,9 +1,9 @@
-"""JSON: the one place where texts become Python objects, and answers become texts.
+"""Convert JSON to Python objects, and answers to JSON, in this one place.
 
-A question is one object in which no name is given twice.  A batch is columns or rows: orjson and
-msgspec read it fast, but no other thread runs meanwhile.  What they refuse is left to Python's
-``json``: that is slow, lets other threads run, gives the reason, and reads NaN, Infinity and
-integers of any size, which are refused by their fields later.
+A question is one object in which no name occurs twice.  A batch is columns or rows. orjson and
+msgspec read a batch fast, but meanwhile no other thread runs.  If they refuse it, Python's ``json``
+reads it: it is slow but lets other threads run, and it gives the reason.  It also reads NaN,
+Infinity and integers of any size, which are refused later with their fields.
 """
 
 import json
@@ -25,8 +25,8 @@ from mumacro.kernel.arrays import Array
 
 from .problems import FieldFault, ProblemKind, RequestError, refuse
 
-_MOST_MEMBERS = 200  # members of an object of a question, at most
-#: what the fast readers raise where a text is no JSON, or has another type
+_MOST_MEMBERS = 200  # largest number of members in an object of a question
+#: exceptions of the fast readers for a text that is not JSON or has another type
 NotRead = (msgspec.MsgspecError, ValueError)
 _COUNTED = 2**18  # bytes of a text that are counted at a time, so that they stay in the cache
 
@@ -43,7 +43,7 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return members
 
 
-# Numbers are read by functions of Python, so that other threads run meanwhile; int refuses 4300
+# Functions of Python read the numbers, so that other threads run meanwhile; int refuses 4300
 # digits.
 _reader = partial(
     json.JSONDecoder,
@@ -65,11 +65,12 @@ def _slowly(text: bytes | bytearray, reader: json.JSONDecoder) -> Any:
 
 
 def decode(text: bytes) -> Any:
-    """Return a question as Python objects; refused where a name is given twice, or an object has
-    far too many members."""
+    """Return a question as Python objects.  Refuse it if a name occurs twice, or an object has far
+    too many members."""
     try:
         value = orjson.loads(text)
-        if b"{" in text and _members_in(value) != text.count(b":"):  # a name twice, a text
+        # a name occurs twice, or there is a colon in a text
+        if b"{" in text and _members_in(value) != text.count(b":"):
             raise ValueError
     except ValueError:
         value = _slowly(text, _OF_QUESTIONS)
@@ -92,8 +93,8 @@ def _members_in(value: Any) -> int:
 
 
 def _few_members(value: Any, path: tuple[str | int, ...] = ()) -> None:
-    """Refuse an object of far more members than there are fields: a reason for each would take
-    long."""
+    """Refuse an object that has far more members than there are fields, because finding a reason
+    for each would take long."""
     if isinstance(value, dict):
         if len(value) > _MOST_MEMBERS:
             reason = f"has {len(value)} members; send only fields, of which no object has so many"
@@ -111,15 +112,15 @@ _NUMBERS = msgspec.json.Decoder(list[float])
 
 
 def decode_batch(text: bytearray) -> Any:
-    """Return any JSON as Python objects, slowly; of a name given twice the last counts."""
+    """Return any JSON as Python objects, slowly; if a name occurs twice, the last value counts."""
     return _slowly(text, _OF_BATCHES)
 
 
 def decode_columns(text: bytearray, numbers: Collection[str], rest: Collection[str]) -> Any:
-    """Return the members of an object: lists of ``numbers`` as arrays, where they hold nothing
-    else.
+    """Return the members of an object: a list in ``numbers`` becomes an array if it holds only
+    numbers.
 
-    Raise one of :data:`NotRead` where a name is neither among ``numbers`` nor in ``rest``.
+    Raise one of :data:`NotRead` if a name is neither in ``numbers`` nor in ``rest``.
     """
     found = _members(tuple(numbers), tuple(rest))(text)
     members = {name: getattr(found, name) for name in found.__struct_fields__}
@@ -139,7 +140,8 @@ def _column(value: msgspec.Raw) -> Any:
 
 @lru_cache(maxsize=1)
 def _members(numbers: tuple[str, ...], rest: tuple[str, ...]) -> Callable[[bytearray], Any]:
-    """Return what takes an object apart, and leaves the texts of ``numbers`` as they are."""
+    """Return the function that splits an object into members and leaves the texts of ``numbers``
+    unread."""
     kinds: list[tuple[str, Any, Any]] = [(name, msgspec.Raw, msgspec.UNSET) for name in numbers]
     kinds += [(name, Any, msgspec.UNSET) for name in rest]
     members = msgspec.defstruct("Members", kinds, forbid_unknown_fields=True)
@@ -149,11 +151,12 @@ def _members(numbers: tuple[str, ...], rest: tuple[str, ...]) -> Callable[[bytea
 def decode_rows(
     text: bytearray, numbers: Collection[str], words: Mapping[str, tuple[str, ...]]
 ) -> dict[str, Any]:
-    """Return rows as columns: arrays of numbers, an infinite k where it is the word rigid, and
-    lists of words.
+    """Return rows as columns: arrays of numbers, with an infinite k for the word rigid, and lists
+    of words.
 
-    Raise one of :data:`NotRead` unless all rows have the names of the first one, which are among
-    ``numbers`` and ``words``, and their values are numbers and the words that a name may have.
+    Raise one of :data:`NotRead` if a row has other names than the first one, if a name is in
+    neither ``numbers`` nor ``words``, or if a value is neither a number nor a word that its name
+    may have.
     """
     names = _first_names(text)
     if not {*names} <= {*numbers, *words}:
@@ -171,7 +174,8 @@ def decode_rows(
         infinite = (math.inf if value == RIGID else value for value in values)
         table = np.fromiter(infinite, np.float64, size)
     listed = {name: [*map(attrgetter(name), rows)] for name in names if name in words}
-    del rows  # before there is a second array: they take four times the memory of the first one
+    # before there is a second array, because rows take four times the memory of the first one
+    del rows
     columns: Array = np.ascontiguousarray(table.reshape(-1, len(numbers)).T)
     return dict(zip(numbers, columns, strict=True)) | listed
 
@@ -188,8 +192,8 @@ def _first_names(text: bytearray) -> tuple[str, ...]:
 def _rows(
     names: tuple[str, ...], numbers: tuple[str, ...], allowed: tuple[tuple[str, ...], ...]
 ) -> Callable[[bytearray], Any]:
-    """Return what reads rows with these names in any order, where the names that are not among
-    ``numbers`` have one of the words ``allowed`` each; it takes half of the time of rows that are
+    """Return the function that reads rows with these names in any order.  A name that is not in
+    ``numbers`` has one of its words in ``allowed``.  This takes half of the time of rows that are
     dictionaries."""
     words = (Literal[one] for one in allowed)
     kinds: dict[str, Any] = {name: float if name in numbers else next(words) for name in names}
@@ -200,8 +204,8 @@ def _rows(
 
 
 def count(text: bytes | bytearray, character: bytes) -> int:
-    """Return how often a character stands in a text; ``text.count`` takes longer where it often
-    does."""
+    """Return how often a character occurs in a text; ``text.count`` is slower if it occurs
+    often."""
     codes, code = np.frombuffer(text, np.uint8), character[0]
     starts = range(0, codes.size, _COUNTED)
     return sum(int(np.count_nonzero(codes[i : i + _COUNTED] == code)) for i in starts)
@@ -209,13 +213,13 @@ def count(text: bytes | bytearray, character: bytes) -> int:
 
 # --- answers --------------------------------------------------------------------------------------
 
-#: Write JSON as bytes; numbers that are not finite become null.
+#: Write JSON as bytes; a number that is not finite becomes null.
 dump = partial(orjson.dumps, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 class Json(Response):
-    """An answer as JSON; Starlette's own looks for what the headers may lack, which takes as long
-    as a case."""
+    """Send an answer as JSON. Starlette's own class completes the headers, which takes as long as a
+    case."""
 
     def __init__(self, content: Any, headers: Mapping[str, str] | None = None) -> None:
         self.status_code, self.body, self.background = 200, dump(content), None

@@ -1,5 +1,5 @@
-"""Counters of requests and cases: those of prometheus_client; several workers share them through
-its multiprocess mode, in a private folder that is made at the start."""
+"""Count requests and cases with prometheus_client.  Several workers share its counters through its
+multiprocess mode, in a private folder that is made at the start."""
 
 import logging
 import os
@@ -28,7 +28,7 @@ from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
 from .tables import LoadedTable, Tables
 
-_SHARED = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client when it is imported
+_SHARED = "PROMETHEUS_MULTIPROC_DIR"  # prometheus_client reads it when it is imported
 # the files of prometheus_client for one worker, and their size with the labels below
 _FILES = ("counter", "histogram", "gauge_mostrecent", "gauge_livesum")
 _FILE_BYTES = 2**19
@@ -41,10 +41,10 @@ _BUCKETS_S = (
 
 @contextmanager
 def shared_counters(workers: int) -> Iterator[None]:
-    """Yield a private folder for the counters of all workers, in memory if possible; it is empty,
-    and removed at the end.
+    """Yield a private, empty folder for the counters of all workers, in memory if possible; remove
+    it at the end.
 
-    Without room for a folder every worker reports its own counters.
+    If there is no room for a folder, every worker reports its own counters.
     """
     memory = "/dev/shm"  # noqa: S108  (a folder of its own is made there)
     with ExitStack() as stack:
@@ -63,17 +63,18 @@ def shared_counters(workers: int) -> Iterator[None]:
 
 
 def _reserve() -> None:
-    """Take the room of this worker's files before prometheus_client maps them into memory: a page
-    of a file for which there is no room ends the process (SIGBUS).
+    """Reserve the room of this worker's files before prometheus_client maps them into memory,
+    because writing to a mapped page for which there is no room ends the process (SIGBUS).
 
-    Without room this worker counts for itself.
+    If there is no room, this worker counts for itself.
     """
     if _SHARED not in os.environ:
         return
     files = [Path(os.environ[_SHARED], f"{kind}_{os.getpid()}.db") for kind in _FILES]
     try:
         for file in files:
-            if not file.exists():  # of a process before this one with its number: go on counting
+            # a file of an earlier process with the same number: continue its counts
+            if not file.exists():
                 file.write_bytes(bytes(_FILE_BYTES))
     except OSError as error:
         for file in files:
@@ -84,14 +85,14 @@ def _reserve() -> None:
 
 
 def forget_the_dead() -> None:
-    """Remove what workers that have been killed held."""
+    """Remove the values of workers that were killed."""
     for file in Path(os.environ[_SHARED]).glob("gauge_livesum_*.db"):
         number = file.stem.rpartition("_")[2]
         if not Path("/proc", number).exists() and Path("/proc/self").exists():
             file.unlink(missing_ok=True)
 
 
-#: what is there now, as gauges: names and meanings
+#: present values, as gauges: names and meanings
 NOW = {
     "connections": "Open connections",
     "slots_in_use": "Computations that have a slot",
@@ -104,7 +105,7 @@ NOW = {
 
 
 class Metrics:
-    """Counters of requests and cases."""
+    """Count requests and cases."""
 
     def __init__(self, paths: Iterable[str]) -> None:
         _reserve()
@@ -131,7 +132,7 @@ class Metrics:
         bad = Counter(
             "mumacro_bad_cases", "Cases of batches that were refused", ["table"], registry=registry
         )
-        # what is there now, by name: set at every look of the loop, and before they are shown
+        # present values, by name: set each time the loop measures, and before they are shown
         self._now = {
             name: Gauge(f"mumacro_{name}", meaning, registry=registry, multiprocess_mode="livesum")
             for name, meaning in NOW.items()
@@ -146,7 +147,7 @@ class Metrics:
             registry=registry,
             multiprocess_mode="mostrecent",
         )
-        # a look-up of labels takes longer than counting
+        # looking up labels takes longer than counting
         self._of_request = cache(
             lambda *labels: (requests.labels(*labels).inc, seconds.labels(labels[0]).observe)
         )
@@ -159,7 +160,7 @@ class Metrics:
         )
 
     def start(self, tables: Tables) -> None:
-        """Name the loaded tables."""
+        """Set the names of the loaded tables."""
         for table in tables.loaded:
             self._info.labels(table.id, format(table.surrogate.tolerance, "g")).set(1)
             self._of_source(table.id, -1)
@@ -175,22 +176,23 @@ class Metrics:
         observe(seconds)
 
     def case(self, table: LoadedTable, source: int, number: int = 1) -> None:
-        """Count answered cases of one source code; -1 are bad ones."""
+        """Count answered cases of one source code; -1 means bad cases."""
         self._of_source(table.id, source).inc(number)
 
     def cases(self, table: LoadedTable, source: Any) -> None:
-        """Count the cases of a batch by their source codes, bad ones among them."""
+        """Count the cases of a batch by their source codes, including bad ones."""
         for code, number in enumerate(np.bincount(source + 1).tolist()):
             if number:
                 self.case(table, code - 1, number)
 
     def now(self, **values: float) -> None:
-        """Set what is there now, by the names of :data:`NOW`."""
+        """Set present values, by the names of :data:`NOW`."""
         for name, value in values.items():
             self._now[name].set(value)
 
     def text(self) -> bytes:
-        """Return the exposition format of Prometheus; with several workers, the sum over all."""
+        """Return the counters in the text format of Prometheus; with several workers, the sum over
+        all."""
         registry = self.registry
         if _SHARED in os.environ:
             registry = CollectorRegistry()

@@ -1,6 +1,6 @@
-"""What is seen of a request from outside: its id, its log line, its counters.
+"""Record what is visible of a request from outside: its id, its log line, its counters.
 
-Logs are JSON lines on standard output, written by a thread.
+Logs are JSON lines on standard output; a thread writes them.
 """
 
 import asyncio
@@ -31,7 +31,7 @@ _TRACE = re.compile(rb"[0-9a-f]{2}-[0-9a-f]{32}-[0-9a-f]{16}-[0-9a-f]{2}")
 _OF_PROXIES = (b"x-forwarded-for", b"x-forwarded-proto")
 # characters that are shown of a client's address, which behind a proxy is a header of any length
 _MOST_SHOWN = 64
-_MOST_WAITING = 10_000  # lines that wait to be written; further lines are dropped
+_MOST_WAITING = 10_000  # largest number of lines that wait to be written; further lines are dropped
 _MOST_OF_ODD = 1000  # characters that are shown of a value that cannot be written as it is
 _WRITE_EVERY_S = 0.05
 
@@ -42,8 +42,8 @@ _access = logging.getLogger("mumacro.access")
 
 
 def for_people(line: Mapping[str, Any]) -> bytes:
-    """Return a line of the log as a person at a terminal reads it; control characters are escaped,
-    so that a client cannot forge a line or move the cursor."""
+    """Return a line of the log as a person at a terminal reads it.  Escape control characters, so
+    that a client cannot forge a line or move the cursor."""
     rest = {name: x for name, x in line.items() if name not in ("time", "level", "logger")}
     traceback = str(rest.pop("exception", "")).splitlines()
     if "duration_ms" in rest:
@@ -61,7 +61,8 @@ _as_json = partial(orjson.dumps, default=str, option=orjson.OPT_APPEND_NEWLINE)
 
 
 def _written(line: Mapping[str, Any], form: Callable[[Mapping[str, Any]], bytes]) -> bytes:
-    """Return a line of the log; of what cannot be written, how Python shows it."""
+    """Return a line of the log.  If it cannot be written, write Python's representation of the
+    values."""
     try:
         return form(line)
     except Exception:
@@ -78,14 +79,15 @@ def _written(line: Mapping[str, Any], form: Callable[[Mapping[str, Any]], bytes]
 
 
 class LogLines(logging.Handler):
-    """Keeps lines for a thread that writes them twenty times a second: a stalled reader delays no
-    request.
+    """Keep lines for a thread that writes them twenty times a second, so that a slow reader delays
+    no request.
 
-    ``logging.handlers.QueueListener`` would wake its thread for every record; a record takes a
+    ``logging.handlers.QueueListener`` would wake its thread for every record.  A record takes a
     tenth of the time of a request, so :class:`Observe` puts its lines here itself.
     """
 
-    #: the one of this process; without it, under another server, that server says what it answered
+    #: the instance of this process; if there is none, another server runs, and that server logs its
+    #: answers
     running: ClassVar["LogLines | None"] = None
 
     def __init__(self) -> None:
@@ -96,7 +98,7 @@ class LogLines(logging.Handler):
 
     @property
     def lost(self) -> int:
-        """How many lines could not be written."""
+        """Return how many lines could not be written."""
         return self._dropped
 
     def put(self, line: dict[str, Any]) -> None:
@@ -120,11 +122,11 @@ class LogLines(logging.Handler):
         self.put(line)
 
     def _write(self) -> None:
-        """Write by file descriptor: a Python file would hold its lock while the reader of a pipe
-        stalls.
+        """Write the lines by file descriptor, because a Python file would hold its lock while the
+        reader of a pipe is slow.
 
-        Line breaks within a line are escaped, so that a client cannot forge one.  Whatever happens,
-        this thread goes on.
+        Escape line breaks within a line, so that a client cannot forge a line.  Whatever happens,
+        this thread continues.
         """
         losses, form = 0, for_people if os.isatty(1) else _as_json
         while True:
@@ -146,19 +148,19 @@ class LogLines(logging.Handler):
             except OSError:  # the reader is gone, or the disk is full
                 lost = sum(size > sent for size in sizes)
                 self._dropped += lost
-                losses += lost  # a line about them would be lost, too
+                losses += lost  # a line about the lost lines would be lost, too
             self._writes = False
 
     def flush(self) -> None:
-        """Wait a second at most for the last lines."""
+        """Wait up to a second for the last lines to be written."""
         until = time.monotonic() + 1.0
         while (self._waiting or self._writes) and time.monotonic() < until:
             time.sleep(0.01)
 
 
 def log_config(level: str) -> dict[str, Any]:
-    """Return a ``logging.config.dictConfig`` for this process: everything to standard output, as
-    JSON lines."""
+    """Return a ``logging.config.dictConfig`` for this process: everything goes to standard output,
+    as JSON lines."""
     return {
         "version": 1,
         "disable_existing_loggers": False,
@@ -169,7 +171,7 @@ def log_config(level: str) -> dict[str, Any]:
 
 
 def _trace_in(scope: Scope) -> dict[str, str]:
-    """Return the trace that a request belongs to, if it says so (W3C Trace Context)."""
+    """Return the trace to which a request belongs, if it says so (W3C Trace Context)."""
     for name, value in scope["headers"]:
         if name == b"traceparent" and _TRACE.fullmatch(value):
             return {"traceparent": value.decode()}
@@ -177,7 +179,7 @@ def _trace_in(scope: Scope) -> dict[str, str]:
 
 
 class Observer:
-    """What is kept of every answer: its id, its line in the log, its counters."""
+    """Record every answer: its id, its line in the log, its counters."""
 
     def __init__(self, metrics: Metrics) -> None:
         self._metrics = metrics
@@ -185,7 +187,7 @@ class Observer:
         self._numbers = itertools.count(int.from_bytes(os.urandom(6)))
 
     def name(self, scope: Scope) -> None:
-        """Give a request its id: the one that it has brought, or a new one."""
+        """Give a request its id: the one in its header, or a new one."""
         if "request_id" not in scope:
             proposal = dict(scope["headers"]).get(b"x-request-id", b"")
             scope["request_id"] = (
@@ -226,7 +228,7 @@ class Observer:
 
 
 class Observe:
-    """Middleware around every answer: what :class:`Observer` keeps of it."""
+    """Record every answer with :class:`Observer` (middleware)."""
 
     def __init__(self, app: ASGIApp, observer: Observer, trusted_proxies: list[str]) -> None:
         self._app, self._observer = app, observer

@@ -1,7 +1,8 @@
-"""What the interactive page is told: the inputs, the contacts and directions, the geometries of a
-contact, an example of measured points, and the map of mu~ over (v~, y~) of each kind of contact.
+"""Collect the data of the interactive page: the inputs, the contacts and directions, the geometries
+of a contact, an example of measured points, and for each contact and direction the map of mu~ over
+(v~, y~).
 
-The service serves it; the page itself is in ``service/static/page``.
+The service serves these data; the page itself is in ``service/static/page``.
 """
 
 from collections.abc import Mapping
@@ -48,7 +49,7 @@ _INPUTS = {
     "f": ("frequency", ["kHz", "Hz", "MHz"], [0, 7], "20 kHz", ""),
     "v0": ("speed", ["mm/s", "µm/s", "m/s"], [-7, 2], "10 mm/s", ""),
 }
-# what may be chosen, with its part of the set-up in words; the first is the usual one
+# the choices, with their part of the set-up in words; the first one is the default
 _CHOICES = {
     "contact": {name: springs.meaning for name, springs in SPRINGS_OF.items()}
     | {"rigid": "rigid contact"},
@@ -74,11 +75,11 @@ _MATERIALS = {
     ],
 }
 _WIDTH, _HEIGHT = 141, 101  # points of the map's grid, twenty a decade
-_UNIT = 1e-4  # what 1 means in the map's integers; a shade of colour is a hundred times coarser
+_UNIT = 1e-4  # unit of the map's integers; a shade of colour is a hundred times coarser
 
 
 def _impossible(contact: str, direction: str) -> str:
-    """Return why a contact has no such direction; empty where it has."""
+    """Return why a contact cannot have a direction, or an empty text if it can."""
     try:
         kind_of(contact, direction)
     except InputError:
@@ -87,9 +88,9 @@ def _impossible(contact: str, direction: str) -> str:
 
 
 def names(built: bool) -> dict[str, Any]:
-    """Return ``names.json``: inputs, choices, geometries with arguments, materials, an example
-    of measured points, the version, and where the pages of the documents are: in the guide that
-    was ``built``, or as they are written."""
+    """Return ``names.json``: inputs, choices, geometries with arguments, materials, an example of
+    measured points, the version, and the place of the documents: the guide, if it was ``built``,
+    otherwise the text files."""
     inputs: dict[str, dict[str, Any]] = {
         name: {
             "label": label,
@@ -135,7 +136,7 @@ def names(built: bool) -> dict[str, Any]:
 
 
 def _outputs_of(kind: tuple[str, str]) -> list[str]:
-    """Return what the page asks beside the friction, of those that a kind has."""
+    """Return the outputs that the page requests, as far as this contact and direction have them."""
     return [
         name
         for name in ("groups", "limits", "gradient", "stick_fraction", "power", "settling")
@@ -144,7 +145,7 @@ def _outputs_of(kind: tuple[str, str]) -> list[str]:
 
 
 def _lacks(kind: tuple[str, str]) -> dict[str, str]:
-    """Return the outputs that a kind has not, each with the reason."""
+    """Return the outputs that a contact and direction do not have, each with the reason."""
     return {
         name: next(reason for word, reason in output.lacks.items() if word in kind)
         for name, output in OUTPUTS.items()
@@ -156,8 +157,9 @@ def _lacks(kind: tuple[str, str]) -> dict[str, str]:
 def map_of(
     surrogate: Surrogate, contact: str = "spring", direction: str = "across"
 ) -> dict[str, Any]:
-    """Return ``map.json``: mu~ of a kind of contact on a grid in whole numbers, rows of constant
-    y~ from below, its border, and what is drawn: levels, colours, places of numbers and regimes."""
+    """Return ``map.json``: mu~ on a grid in whole numbers for a contact and direction, rows of
+    constant y~ from below, its border, and what the page draws: levels, colours, places of numbers
+    and regimes."""
     kind = kind_of(contact, direction)
     ratio, v_crit = surrogate.map_of(kind, _WIDTH, _HEIGHT)
     v, y = plotting.speeds(_WIDTH), plotting.amplitudes(_HEIGHT, kind.normal)
@@ -179,6 +181,6 @@ def map_of(
 
 
 def _scales(units: Mapping[str, Scale]) -> dict[str, list[float]]:
-    """Return the factor and the divisor of each unit, also as it is typeset, with µ."""
+    """Return the factor and the divisor of each unit, also in its typeset form, with µ."""
     scales = {unit: [scale.times, scale.over] for unit, scale in units.items()}
     return scales | {unit.replace("u", "µ"): scale for unit, scale in scales.items() if "u" in unit}

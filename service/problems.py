@@ -1,9 +1,9 @@
-"""Exception -> RFC 9457 problem details.
+"""Convert exceptions to problem details (RFC 9457).
 
 Every error that leaves the application is ``application/problem+json``: ``type, title, status,
-detail, instance``, the request id, and for bad fields ``errors`` with a JSON pointer (bodies) or a
-parameter (queries), the value, and what it must be.  All faults of a request are reported at once.
-No traceback reaches a user.
+detail, instance`` and the request id.  For bad fields it has ``errors`` with a JSON pointer
+(bodies) or a parameter (queries), the value, and what it must be.  All faults of a request are
+reported at once.  A user never sees a traceback.
 """
 
 import asyncio
@@ -39,18 +39,18 @@ _NO_VALUE = object()
 CLOSE = {"Connection": "close"}
 # the members of the objects within a body
 _WITHIN = dict.fromkeys(PARTS, ("harmonic", "amplitude", "phase"))
-# for how long, and how many bytes, a refused body is read
+# limits of time and bytes for reading a refused body
 _LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024
-_PAUSE_S = 1.0  # a client that sends nothing for so long has read the answer
+_PAUSE_S = 1.0  # a client that sends nothing for this time has read the answer
 _log = logging.getLogger("mumacro.error")
 
 
 @dataclass(frozen=True)
 class FieldFault:
-    """One bad field of a request: where it is, what was given, why it is refused.
+    """Hold one bad field of a request: its place, its value, and the reason.
 
-    ``parameter``: whether it stands in the query; None: as in all of its request (a GET has a
-    query, a POST a body).
+    ``parameter`` tells whether it is in the query; None means: as for the whole request (a GET has
+    a query, a POST a body).
     """
 
     path: tuple[str | int, ...]
@@ -60,11 +60,11 @@ class FieldFault:
 
     @classmethod
     def of(cls, name: str, reason: str, value: object = _NO_VALUE) -> "FieldFault":
-        """Return the fault of a field at the top of the body, or of a parameter."""
+        """Return the fault of a field at the top level of the body, or of a parameter."""
         return cls((name,), reason, value)
 
     def as_json(self, query: bool) -> dict[str, object]:
-        """Return the entry of ``errors``; the pointer is in RFC 6901's URI fragment form, as in RFC
+        """Return the entry of ``errors``; the pointer has RFC 6901's URI fragment form, as in RFC
         9457."""
         names = [step for step in self.path if isinstance(step, str)]
         entry: dict[str, object] = {}
@@ -85,11 +85,12 @@ class FieldFault:
 
 
 def _shown(value: object) -> object:
-    """Return the value as JSON can hold it, and short enough to be shown: NaN becomes the text
+    """Return the value in a form that JSON can hold, short enough to be shown; NaN becomes the text
     "NaN"."""
     if isinstance(value, str):
         short = value if len(value) <= _MAX_TEXT else value[: _MAX_TEXT - 1] + "…"
-        return short.encode("utf-8", "replace").decode()  # half of a surrogate pair is no text
+        # half of a surrogate pair is not valid text
+        return short.encode("utf-8", "replace").decode()
     if isinstance(value, float) and not math.isfinite(value):
         return json.dumps(value)
     if isinstance(value, int) and not -(2**63) <= value < 2**64:
@@ -120,9 +121,10 @@ def faults_of(
     errors: Iterable[Any], allowed: Iterable[str], parameter: bool | None = None
 ) -> list[FieldFault]:
     """Return Pydantic's errors as faults, one per place; ``allowed`` are the names that may be
-    given.
+    there.
 
-    Those that are not shown have no reason: to find one takes longer than to find the fault.
+    A fault that is not shown has no reason, because to find the reason takes longer than to find
+    the fault.
     """
     faults: dict[tuple[str | int, ...], FieldFault] = {}
     for error in errors:
@@ -152,7 +154,7 @@ def reason_of(error: InputError) -> str:
 
 
 def _reason(error: Any, name: str, allowed: Iterable[str]) -> str:
-    """Return what is wrong with a value, in the words of the library where it has some."""
+    """Return what is wrong with a value, in the words of the library if it has some."""
     kind, value = error["type"], error["input"]
     cause = error.get("ctx", {}).get("error")
     if isinstance(cause, InputError):
@@ -195,15 +197,15 @@ _LARGE = 1e308
 
 
 def names_of(model: type[BaseModel]) -> tuple[str, ...]:
-    """Return what a model may be given: inputs first, options after them."""
+    """Return the names of a model's members: inputs first, then options."""
     fields = model.model_fields
     inputs = [name for name in (*INPUTS, *MEASURED_AS) if name in fields]
     return tuple(dict.fromkeys([*inputs, *fields]))
 
 
 def _place(path: tuple[str | int, ...], body: Any) -> tuple[str | int, ...]:
-    """Return a place as far as the body has it: within a value that stands for a list of one, such
-    as a target, there is none."""
+    """Return a place as the body has it.  A single value that stands for a list, such as a target,
+    has no place within the list."""
     for i, step in enumerate(path):
         if isinstance(step, int) and not isinstance(body, list):
             return path[:i]
@@ -232,15 +234,15 @@ def invalid(
 
 
 def _understood(members: Any) -> dict[str, Any]:
-    """Return what was understood of the other inputs, where the request asks for it."""
+    """Return how the program understood the other inputs, if the request asks for it."""
     if not isinstance(members, Mapping) or not is_wanted(members):
         return {}
     return {UNDERSTOOD: understood(members)}
 
 
 def _absent_in(members: Mapping[str, Any]) -> Iterator[FieldFault]:
-    """Yield the faults of inputs of which one of several is required: the library would tell the
-    first of them, when everything else is right."""
+    """Yield the faults of missing inputs where one of several is required. (The library would
+    report only the first one, after all other faults are corrected.)"""
     directions = members.get("direction", "across")
     words = directions if isinstance(directions, (list, np.ndarray)) else [directions]
     normal = any(isinstance(word, str) and word == "normal" for word in words)
@@ -257,8 +259,8 @@ _ALTERNATIVES = {
 
 
 class ProblemKind(Enum):
-    """The kinds of problems, the one table of them: status, title, headers, the exception that
-    means it and what is told then.  The connection closes where the rest of a request is not read.
+    """Define the problems in one table: status, title, headers, the exception that belongs to it
+    and the detail.  The connection is closed if the rest of a request is not read.
     """
 
     MALFORMED_BODY = 400, "The request cannot be read"
@@ -289,7 +291,7 @@ class ProblemKind(Enum):
         "send a smaller request, or send it later",
     )
     TOOK_TOO_LONG = 503, "The request took too long", {**CLOSE, "Retry-After": "1"}
-    # the last one, because it is every other exception, of which nothing is told
+    # last, because it matches every other exception, of which no detail is shown
     UNEXPECTED = (
         500,
         "An unexpected error",
@@ -311,8 +313,8 @@ class ProblemKind(Enum):
 
 
 class RequestError(MumacroError):
-    """A request that cannot be answered: the kind, why, the bad fields, headers and members of the
-    document."""
+    """Report a request that cannot be answered: the problem, the reason, the bad fields, and
+    headers and members of the document."""
 
     def __init__(
         self,
@@ -327,13 +329,13 @@ class RequestError(MumacroError):
         super().__init__(detail)
 
 
-#: what our own server (server.py) says of a request in ``scope["state"]``: how to end its
-#: connection, that too many are open, the status with which it was refused there
+#: what our own server (server.py) writes into ``scope["state"]`` of a request: how to end its
+#: connection, whether too many are open, and the status if the server refused it
 ABORT, FULL, REFUSED = "abort", "full", "refused"
 
 
 def path_in(scope: Scope) -> str:
-    """Return the path without what a proxy has put before it."""
+    """Return the path without the prefix that a proxy has added."""
     return str(scope["path"]).removeprefix(scope.get("root_path", ""))
 
 
@@ -341,7 +343,7 @@ def path_in(scope: Scope) -> str:
 
 
 def meaning(error: Exception, scope: Scope) -> RequestError:
-    """Return what an exception means for its request."""
+    """Return the error that an exception means for its request."""
     if isinstance(error, RequestError):
         return error
     if isinstance(error, InputError):
@@ -353,7 +355,7 @@ def meaning(error: Exception, scope: Scope) -> RequestError:
 
 
 def _of_http(error: HTTPException, scope: Scope) -> RequestError:
-    """Return what Starlette refuses: no such path, method or part of a file."""
+    """Return the error for what Starlette refuses: an unknown path, method or part of a file."""
     kinds = (kind for kind in ProblemKind if kind.status == error.status_code)
     kind = next(kinds, ProblemKind.UNEXPECTED)
     detail, headers = error.detail, error.headers
@@ -361,7 +363,8 @@ def _of_http(error: HTTPException, scope: Scope) -> RequestError:
         detail = kind.detail
     elif kind is ProblemKind.NOT_FOUND:
         detail = _no_such_path(scope)
-    elif kind is ProblemKind.METHOD_NOT_ALLOWED:  # Starlette names those of one route of the path
+    # Starlette names only the methods of one route of the path
+    elif kind is ProblemKind.METHOD_NOT_ALLOWED:
         methods = scope["app"].state.methods.get(path_in(scope), "GET, HEAD")
         detail = f"{scope['method'][:20]} is not allowed here; allowed: {methods}"
         headers = {"Allow": methods}
@@ -375,7 +378,7 @@ _NO_GUIDE = (
 
 
 def _no_such_path(scope: Scope) -> str:
-    """Return what to do about a path that is not there."""
+    """Return what to do about an unknown path."""
     path = path_in(scope)
     if scope["app"].state.settings.guide is None and (path + "/").startswith("/guide/"):
         return _NO_GUIDE
@@ -383,7 +386,7 @@ def _no_such_path(scope: Scope) -> str:
 
 
 def of_input(error: InputError, **members: Any) -> RequestError:
-    """Return what the library refuses, such as a relation between inputs."""
+    """Return the error for what the library refuses, such as a relation between inputs."""
     value = _NO_VALUE if error.value is None else error.value
     path: tuple[str | int, ...] = (error.field,)
     if error.index is not None:
@@ -393,7 +396,7 @@ def of_input(error: InputError, **members: Any) -> RequestError:
 
 @contextmanager
 def with_members(**members: Any) -> Iterator[None]:
-    """Yield members that the problem document of a refusal has beside its faults."""
+    """Add members to the problem document of any refusal within the block."""
     try:
         yield
     except InputError as error:
@@ -442,18 +445,18 @@ def answer_to(error: Exception, scope: Scope) -> ASGIApp:
 
 
 class _BeforeRest:
-    """An answer whose client may still be sending its body.
+    """Send an answer to a client that may still be sending its body.
 
-    The rest is read and dropped for a while before the connection is closed: else many clients see
-    a reset and no reason.
+    The rest of the body is read and dropped for a while before the connection is closed.  Otherwise
+    many clients see a reset and no reason.
     """
 
     def __init__(self, answer: Response) -> None:
         self._answer = answer
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send the answer, which has a Content-Length, and drop the rest of the body; only then
-        end the answer, upon which the server closes the connection."""
+        """Send the answer, which has a Content-Length, and drop the rest of the body.  Only then
+        end the answer, so that the server closes the connection."""
 
         async def send_unended(message: Message) -> None:
             if message["type"] == "http.response.body":
@@ -476,7 +479,8 @@ async def _drop_body(receive: Receive) -> None:
 
 
 class Failures:
-    """Middleware: every exception becomes a problem document; an unexpected one goes to the log."""
+    """Convert every exception to a problem document (middleware); an unexpected one goes to the
+    log."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -503,7 +507,7 @@ class Failures:
                 raise ClientDisconnect from error
             try:
                 answer = answer_to(error, scope)
-            except Exception as fault:  # such as a detail that JSON does not hold
+            except Exception as fault:  # such as a detail that JSON cannot hold
                 _log_unexpected(fault, scope)
                 answer = answer_to(fault, scope)
             await answer(scope, receive, send)

@@ -1,4 +1,4 @@
-"""API keys, and what the head of a request may say: two middlewares in front of every path."""
+"""Check API keys and the headers of a request, with two middlewares in front of every path."""
 
 import secrets
 from collections.abc import Iterable, Mapping
@@ -8,7 +8,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from .problems import ProblemKind, RequestError, path_in
 
-#: as OpenAPI names the two ways to send a key
+#: the two ways to send a key, as OpenAPI names them
 SCHEMES = {
     "key": {"type": "apiKey", "in": "header", "name": "X-API-Key"},
     "bearer": {"type": "http", "scheme": "bearer"},
@@ -27,16 +27,16 @@ _ONCE = (
 
 
 class Keys:
-    """Every path needs a key but those that are named, and what is below ``/guide/``.
+    """Require a key for every path, except the paths in the list and those below ``/guide/``.
 
-    A dependency of each router would leave open whatever somebody forgets to give it.
+    A dependency of each router would leave a path open if somebody forgets it.
     """
 
     def __init__(self, app: ASGIApp, keys: Mapping[str, str], open_paths: Iterable[str]) -> None:
         self._app, self._keys, self._open = app, keys, frozenset(open_paths)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request pass with a known key; the name of the key's holder goes into the log."""
+        """Let a request with a known key pass; the name of the key's holder goes into the log."""
         if scope["type"] == "http":
             path = path_in(scope)
             if path not in self._open and not path.startswith("/guide/"):
@@ -49,7 +49,7 @@ class Keys:
             scheme, _, credentials = headers.get(b"authorization", b"").partition(b" ")
             candidate = credentials if scheme.lower() == b"bearer" else b""
         candidate = candidate.strip()
-        # compares all keys: the time does not depend on the key sent
+        # compares all keys, so that the time does not depend on the key in the request
         names = [
             name
             for key, name in self._keys.items()
@@ -63,13 +63,13 @@ class Keys:
 
 
 class ClearHead:
-    """Refuses a head that says two things."""
+    """Refuse headers that contradict each other."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request pass whose head is clear."""
+        """Let a request pass if its headers are unambiguous."""
         if scope["type"] == "http":
             _check(scope, dict(scope["headers"]))
         await self._app(scope, receive, send)

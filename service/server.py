@@ -1,9 +1,9 @@
-"""uvicorn's own protocol with limits: a time for every wait, the size of a head, one request at a
-time.
+"""Extend uvicorn's protocol by limits: a time for every wait, the size of the headers, one request
+at a time.
 
-uvicorn takes the class by its documented ``http`` parameter.  It uses parts of
-``HttpToolsProtocol`` that have no promise of stability: pyproject.toml bounds the version, and the
-tests try every limit on a socket.
+uvicorn takes the class by its documented ``http`` parameter.  The class uses parts of
+``HttpToolsProtocol`` that are not promised to be stable, so pyproject.toml bounds the version, and
+the tests try every limit on a socket.
 """
 
 import math
@@ -18,20 +18,20 @@ from .admission import Admission
 from .observe import Observer
 from .problems import ABORT, FULL, REFUSED, ProblemKind, RequestError, problem_of
 
-MAX_HEAD = 64 * 1024  # bytes of a request's head, at most
-MAX_FIELDS = 100  # fields of a head, at most
+MAX_HEAD = 64 * 1024  # largest size of a request's headers, in bytes
+MAX_FIELDS = 100  # largest number of headers
 _MOST_SHOWN = 200  # bytes that are shown of a path that is refused here
-_PIECE = 2048  # bytes of a head that are read before its fields are counted
-# seconds after the deadline of an answer, which the application keeps itself where it can
+_PIECE = 2048  # bytes of the headers that are read before they are counted
+# seconds after the deadline of an answer, which the application itself keeps if it can
 _MARGIN_S = 2.0
-_LOOK_EVERY_S = 0.25  # seconds between two looks whether the time of a connection is over
+_LOOK_EVERY_S = 0.25  # seconds between two checks whether the time of a connection is over
 _TOO_LARGE = RequestError(
     ProblemKind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes"
 )
 
 
 def _without_upgrade(headers: list[tuple[bytes, bytes]]) -> Iterator[tuple[bytes, bytes]]:
-    """Yield the fields of a head that do not ask for another protocol."""
+    """Yield the headers that do not ask for another protocol."""
     for name, value in headers:
         if name == b"connection":
             options = (option.strip() for option in value.split(b","))
@@ -41,15 +41,15 @@ def _without_upgrade(headers: list[tuple[bytes, bytes]]) -> Iterator[tuple[bytes
 
 
 class _Transport:
-    """A transport that sends the head of an answer together with what follows at once: one packet,
-    not two."""
+    """Send the headers of an answer together with the data that follow immediately: one packet, not
+    two."""
 
     def __init__(self, transport: Any, loop: Any) -> None:
         self._transport, self._loop, self._pending = transport, loop, b""
         self.is_closing = transport.is_closing
 
     def write(self, data: bytes) -> None:
-        """Keep the first piece until the next one, or until the loop goes on."""
+        """Keep the first piece until the next one, or until the loop continues."""
         if not self._pending:
             self._loop.call_soon(self.flush)
             self._pending = data
@@ -57,13 +57,13 @@ class _Transport:
             self.flush(data)
 
     def flush(self, data: bytes = b"") -> None:
-        """Send what is pending, and this, unless the client has left meanwhile."""
+        """Send what is pending, and this, unless the client has left."""
         head, self._pending = self._pending, b""
         if head and not self.is_closing():
             self._transport.write(head + data)
 
     def close(self) -> None:
-        """Close when all is sent."""
+        """Close when everything is sent."""
         self.flush()
         self._transport.close()
 
@@ -72,19 +72,20 @@ class _Transport:
 
 
 class Connection(HttpToolsProtocol):
-    """One connection.  It is closed when the client is silent, slow to send or to read, or sends
-    too large a head.
+    """Serve one connection.  Close it if the client is silent, is slow to send or to read, or sends
+    headers that are too large.
 
-    A request to upgrade the connection to another protocol is answered as if it did not ask for
-    that (RFC 9110, 7.8).  A second request that arrives before the first is answered is dropped,
-    and the connection closes after the answer.  When all connections are open, the one that has
-    waited longest for a request is closed in favour of a new one.
+    A request to upgrade the connection to another protocol is answered as if it did not ask for it
+    (RFC 9110, 7.8).  A second request that arrives before the first is answered is dropped, and the
+    connection closes after the answer.  If all connections are open, a new one replaces the one
+    that has waited longest for a request.
     """
 
-    #: connections without a request, the longest waiting first
+    #: connections without a request; the one that has waited longest is the first
     waiting: ClassVar[dict["Connection", None]] = {}
-    _due = _end = math.inf  # when the client must have moved, and the answer be complete
-    _bytes = 0  # since the last answer
+    # times by which the client must have moved, and the answer must be complete
+    _due = _end = math.inf
+    _bytes = 0  # bytes since the last answer
     _in_head = _second = False
     _refusal: RequestError | None = None
 
@@ -104,7 +105,7 @@ class Connection(HttpToolsProtocol):
         self._due = min(self._due, self.loop.time() + self._settings.client_timeout_s)
 
     def _look(self) -> None:
-        """End the connection if its time is over: with 408 where a request has begun and its answer
+        """End the connection if its time is over; answer 408 if a request has begun and its answer
         has not."""
         now = self.loop.time()
         if now > self._due and (self._in_head or self._busy) and now <= self._end:
@@ -120,7 +121,7 @@ class Connection(HttpToolsProtocol):
             self.loop.call_later(_LOOK_EVERY_S, self._look)
 
     def _refuse(self, error: RequestError) -> None:
-        """Answer in place of the application, unless that has begun, and close."""
+        """Answer instead of the application (unless it has begun its answer), and close."""
         if self._busy and self.cycle.response_started:
             self.abort()
         elif not self.transport.is_closing():
@@ -132,14 +133,14 @@ class Connection(HttpToolsProtocol):
             self.transport.close()
 
     def _refused(self, status: int) -> Any:
-        """Return the scope of a request that is refused here, seen by the observer, now or when the
-        application has ended."""
+        """Return the scope of a request that is refused here.  The observer records it, now or when
+        the application has ended."""
         if self._busy:
             busy: Any = self.scope
             self._observer.name(busy)
             busy["state"][REFUSED] = status
             return busy
-        if not self._in_head:  # nothing of a request is there
+        if not self._in_head:  # no part of a request has arrived
             super().on_message_begin()
         method = self.parser.get_method().decode("ascii") if self.url else ""
         path = self.url.partition(b"?")[0][:_MOST_SHOWN].decode("latin-1")
@@ -149,7 +150,7 @@ class Connection(HttpToolsProtocol):
         return scope
 
     def shutdown(self) -> None:
-        """Refuse new work; uvicorn calls this for every connection when it is to stop."""
+        """Refuse new work; uvicorn calls this for every connection when the server must stop."""
         self._admission.begin_stop()
         super().shutdown()
 
@@ -174,12 +175,12 @@ class Connection(HttpToolsProtocol):
         self._look()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forget it."""
+        """Forget the connection."""
         self.waiting.pop(self, None)
         super().connection_lost(exc)
 
     def eof_received(self) -> bool:  # type: ignore[override]
-        """Answer a whole request of a client that has closed its own side."""
+        """Answer a complete request of a client that has closed its side."""
         self.transport.flush()
         if not self._busy or self.cycle.more_body:
             return False
@@ -187,14 +188,14 @@ class Connection(HttpToolsProtocol):
         return True
 
     def data_received(self, data: bytes) -> None:
-        """Read some bytes, unless they follow a request that is not answered yet."""
+        """Read bytes, unless they follow a request that is not answered yet."""
         start = 0
         while start < len(data) and not self._second and not self.transport.is_closing():
             stop = len(data) if self._busy and not self._in_head else start + _PIECE
             piece = data[start:stop]
             start, self._bytes = stop, self._bytes + len(piece)
             self._feed(piece)
-            # also behind a body
+            # also after a body
             if len(self.headers) > MAX_FIELDS or (self._in_head and self._bytes > MAX_HEAD):
                 self._refuse(_TOO_LARGE)
         # where the application limits every wait
@@ -216,13 +217,13 @@ class Connection(HttpToolsProtocol):
 
     @property
     def _upgrades(self) -> bool:
-        """Whether the parser takes what follows the head for another protocol."""
+        """Return whether the parser takes the data after the headers for another protocol."""
         upgrades: bool = self.parser.should_upgrade()
         return upgrades and self.parser.get_method() != b"CONNECT"
 
     def _read_without_upgrade(self, rest: bytes) -> None:
-        """Read the header again, without what asks for an upgrade, and then the body: this parser
-        reads none behind an upgrade."""
+        """Read the headers again, without those that ask for an upgrade, and then the body, because
+        this parser reads no body after an upgrade."""
         start = b"%b %b HTTP/%b" % (
             self.parser.get_method(),
             self.url,
@@ -239,12 +240,12 @@ class Connection(HttpToolsProtocol):
         self._watch()
 
     def resume_writing(self) -> None:
-        """Go on: the client has read."""
+        """Continue, since the client has read."""
         super().resume_writing()
         self._due = math.inf
 
     def on_message_begin(self) -> None:
-        """Begin a head, if the request before it is answered."""
+        """Begin to read headers, if the previous request is answered."""
         if self._busy:
             self._second, self.cycle.keep_alive = True, False
             raise ValueError("a second request")
@@ -269,20 +270,20 @@ class Connection(HttpToolsProtocol):
             self.scope["state"][FULL] = True
         self.scope["state"][ABORT] = self.abort
         super().on_headers_complete()
-        # fields behind a body say nothing of the request (RFC 9110, 6.5.1)
+        # headers after a body say nothing about the request (RFC 9110, 6.5.1)
         self.headers = []
         self._end = self.loop.time() + self._settings.time_limit_s + _MARGIN_S
 
     def on_message_complete(self) -> None:
-        """Take a request that the client has sent whole."""
-        if self._in_head:  # what follows is read again
+        """Take a request that has arrived completely."""
+        if self._in_head:  # the data that follow are read again
             return
         self._due = math.inf
         super().on_message_complete()
 
     def on_response_complete(self) -> None:
-        """Wait for the next request; in place of uvicorn, which starts a timer of its own for
-        that."""
+        """Wait for the next request.  This replaces uvicorn's method, which starts its own timer
+        for it."""
         self.server_state.total_requests += 1
         if not self.transport.is_closing():
             self.flow.resume_reading()

@@ -1,8 +1,8 @@
-"""Settings of the service: ``MUMACRO_*`` environment variables, checked before anything starts.
+"""Read the settings of the service from ``MUMACRO_*`` environment variables, and check them before
+anything starts.
 
-Each setting has a row in the table of docs/operations.md.  A bad one is reported in one
-line that names the variable, the value and what it must be; the value of the API key is never
-shown.
+Each setting has a row in the table of docs/operations.md.  A bad setting is reported in one line
+that names the variable, the value and what it must be.  The value of the API key is never shown.
 """
 
 import os
@@ -20,11 +20,11 @@ _MAX_AGE_S = 3600
 
 
 class SettingsError(ValueError):
-    """One or more settings cannot be used; the text says which, and what they must be."""
+    """Report settings that cannot be used; the text says which, and what they must be."""
 
 
 def _split(value: Any, separator: str = ",") -> Any:
-    """Return ``a, b`` -> [``a``, ``b``]; what is no text is taken as it is."""
+    """Return ``a, b`` -> [``a``, ``b``]; return a value that is not a text unchanged."""
     return (
         [part.strip() for part in value.split(separator) if part.strip()]
         if isinstance(value, str)
@@ -33,9 +33,10 @@ def _split(value: Any, separator: str = ",") -> Any:
 
 
 def _pairs(value: Any) -> Any:
-    """Return ``a=1, b=2`` -> {``a``: ``1``, ``b``: ``2``}; what is no text is taken as it is.
+    """Return ``a=1, b=2`` -> {``a``: ``1``, ``b``: ``2``}; return a value that is not a text
+    unchanged.
 
-    ValueError for a part without a name, and for a name that is given twice.
+    Raise ValueError for a part without a name, and for a name that occurs twice.
     """
     if not isinstance(value, str):
         return value
@@ -55,7 +56,7 @@ def _without_dots(path: str) -> str:
 
 
 def _an_origin(text: str) -> str:
-    """Return the origin of a page as a browser sends it: no path, no slash at the end."""
+    """Return the origin of a page as a browser sends it: without path and final slash."""
     parts = urlsplit(text)
     if text != "*" and not (parts.netloc and text == f"{parts.scheme}://{parts.netloc}".lower()):
         raise ValueError("not an origin")
@@ -69,7 +70,7 @@ def _networks(texts: tuple[str, ...]) -> tuple[str, ...]:
     return texts
 
 
-# in site-packages PyTables may own it, without a table
+# in site-packages this folder may belong to PyTables, and then has no table
 _BESIDE = Path(__file__).resolve().parent.parent / "tables"
 _TABLES = _BESIDE if any(_BESIDE.glob("*.nc")) else Path("tables")
 
@@ -92,17 +93,17 @@ def _whole(default: int, least: int, most: int, condition: str = "") -> Any:
     )
 
 
-#: what to do about keys that cannot be used
+#: advice for keys that cannot be used
 _NO_KEY = "unset the variable where no key is needed"
 
-# An empty variable must not count as "no key": a variable that is set shows that a key was
-# intended.
+# An empty variable must not count as "no key", because somebody who sets the variable intends a
+# key.
 Key = Secret[Annotated[str, Field(pattern=r"^[!-~]{1,512}$")]]
 KeyName = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,64}$")]
 
 
 class Settings(BaseSettings):
-    """All settings.  Each description says what a value must be."""
+    """Hold all settings.  Each description says what a value must be."""
 
     model_config = SettingsConfigDict(env_prefix=PREFIX, extra="forbid", frozen=True)
 
@@ -164,7 +165,8 @@ class Settings(BaseSettings):
     shutdown_grace_s: int = _whole(10, 0, 3600)
 
     def keys(self) -> dict[str, str]:
-        """Return API key -> name of its holder, which logs show; empty where no key is needed."""
+        """Return API key -> name of its holder, which logs show; return an empty dict if no key is
+        needed."""
         holders = {key.get_secret_value(): name for name, key in self.api_keys.items()}
         if self.api_key is not None:
             holders.setdefault(self.api_key.get_secret_value(), "default")
@@ -172,8 +174,8 @@ class Settings(BaseSettings):
 
     @cached_property
     def cache_fields(self) -> dict[str, str]:
-        """How long, and by whom, an answer may be cached: with an API key, only by the client
-        itself."""
+        """Return how long, and by whom, an answer may be cached: with an API key, only by the
+        client itself."""
         if not self.keys():
             return {"Cache-Control": f"public, max-age={_MAX_AGE_S}"}
         return {
@@ -183,8 +185,8 @@ class Settings(BaseSettings):
 
 
 def load_settings(**overrides: Any) -> Settings:
-    """Return the settings of the environment; ``overrides`` win. SettingsError names all that is
-    bad, in one line."""
+    """Return the settings of the environment; ``overrides`` replace them.  SettingsError names all
+    bad settings, in one line."""
     try:
         return Settings(**overrides)
     except ValidationError as error:
@@ -198,8 +200,8 @@ def load_settings(**overrides: Any) -> Settings:
 
 
 def unknown_variables() -> list[str]:
-    """Return variables that begin with MUMACRO_ and are not settings: mostly spelling mistakes, so
-    the log warns of them."""
+    """Return variables that begin with MUMACRO_ and are not settings.  Most are spelling mistakes,
+    so the log warns of them."""
     names = {f"{PREFIX}{name.upper()}" for name in Settings.model_fields}
     return sorted(
         name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in names

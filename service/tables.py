@@ -1,4 +1,4 @@
-"""The loaded tables.  Each is opened and its checksum and a known answer are checked before the
+"""Load the tables.  Each is opened, and its checksum and a known answer are checked, before the
 service is ready."""
 
 import asyncio
@@ -13,15 +13,15 @@ from . import API_VERSION
 from .admission import Thread
 from .problems import FieldFault, ProblemKind, RequestError, refuse
 
-_PATIENCE_S = 2.0  # for a look at the files
+_PATIENCE_S = 2.0  # longest time for a check of the files
 _log = logging.getLogger("mumacro.tables")
 
 
 def _files(paths: Sequence[Path]) -> list[Path]:
-    """Return files among ``paths``, and the ``*.nc`` files of the directories among them, in order
-    of name.
+    """Return the files among ``paths``, and the ``*.nc`` files of the directories among them, in
+    order of name.
 
-    TableError where a path is missing, or a directory holds no table.
+    Raise TableError if a path is missing, or a directory holds no table.
     """
     files: list[Path] = []
     for path in paths:
@@ -35,7 +35,7 @@ def _files(paths: Sequence[Path]) -> list[Path]:
 
 
 def _stamp(path: Path) -> tuple[int, int, int]:
-    """Return size, time and place of a file; TableError where there is none."""
+    """Return size, time and place of a file.  Raise TableError if it does not exist."""
     try:
         status = path.stat()
     except OSError as error:
@@ -44,8 +44,8 @@ def _stamp(path: Path) -> tuple[int, int, int]:
 
 
 class LoadedTable:
-    """A table in memory, and the state of its file when it was read; TableError where it is
-    damaged."""
+    """Hold a table in memory, and the state of its file when it was read.  Raise TableError if it
+    is damaged."""
 
     def __init__(self, path: Path) -> None:
         self.stamp, self.surrogate = _stamp(path), Surrogate.open(path, threads=1)
@@ -57,7 +57,7 @@ class LoadedTable:
         self.check()
 
     def check(self) -> None:
-        """Check the known answer, and that the file is as it was; else TableError."""
+        """Check the known answer, and that the file is unchanged; otherwise raise TableError."""
         self.surrogate.self_check()
         if _stamp(self.surrogate.path) != self.stamp:
             raise TableError(
@@ -66,13 +66,13 @@ class LoadedTable:
 
 
 class Tables:
-    """All tables of the service, tightest first; or the reason why there are none."""
+    """Hold all tables of the service, the tightest first, or the reason why there are none."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self.paths = tuple(paths)
         self.loaded: tuple[LoadedTable, ...] = ()
         self.fault: str | None = "the tables are not loaded yet"
-        self._checking: asyncio.Future[None] | None = None  # the last look at the files
+        self._checking: asyncio.Future[None] | None = None  # the last check of the files
 
     def load(self) -> None:
         """Load all tables.  A refused table makes the service not ready; it never stops the
@@ -100,10 +100,10 @@ class Tables:
             )
 
     async def check(self) -> None:
-        """Check every table again; TableError, or RequestError where none is loaded.
+        """Check every table again.  Raise TableError, or RequestError if no table is loaded.
 
-        The files are looked at in a thread, one for all who ask at the same time: a file system
-        that hangs stops nobody else.
+        A thread checks the files, one for all requests that ask at the same time, so that a file
+        system that hangs stops no other request.
         """
         self.pick()
         if self._checking is None or self._checking.done():

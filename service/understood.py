@@ -1,4 +1,5 @@
-"""What was understood of the inputs of a request: ``include=inputs``, for the page and for logs."""
+"""Tell how the program understood the inputs of a request: ``include=inputs``, for the page and for
+logs."""
 
 import math
 from collections.abc import Mapping
@@ -24,9 +25,8 @@ def is_wanted(members: Mapping[str, Any]) -> bool:
 
 
 def understood(members: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return each input that can be read: its text, its value in SI, the unit that was typed or the
-    SI unit; the deviation and the ends of an interval where it has them. An input that is refused
-    is left out.
+    """Return each input that can be read: its text, its value in SI, the unit in the text or else
+    the SI unit, and its deviation or interval if it has one.  An input that is refused is left out.
 
     >>> understood({"k": "1 ± 0.1 N/um", "target": "15 %"})["target"]
     {'text': '15 %', 'value': 0.15, 'unit': '%'}
@@ -54,7 +54,7 @@ def understood(members: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 def _part(name: str, value: Any) -> dict[str, Any] | None:
-    """Return an oscillation of a motion: the amplitude of its first harmonic, and all of them."""
+    """Return an oscillation of a motion: the amplitude of its first harmonic, and all harmonics."""
     if value is None:
         return None
     try:
@@ -76,7 +76,7 @@ def _is_pair(value: Any) -> bool:
 
 
 def _of(name: str, value: Any, quantity: str) -> dict[str, Any] | None:
-    """Return one value, None where there is none; InputError where it cannot be read."""
+    """Return one value, or None if there is none.  Raise InputError if it cannot be read."""
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         return None
     one, unit = read(name, value, quantity), QUANTITIES[quantity].unit

@@ -1,7 +1,8 @@
-"""What is answered.  The models of a case and of cases in columns are made from the library's list
-of outputs, with its units and meanings; the others are written out.
+"""Define the answers.  The library's list of outputs, with its units and meanings, gives the models
+of a case and of cases in columns; the others are written here.
 
-A member whose value can be missing is null there; what ``include`` did not ask for is left out.
+A member whose value can be missing is null there; a value that ``include`` did not ask for is left
+out.
 """
 
 from collections import defaultdict
@@ -31,15 +32,15 @@ def _described(member: Member, default: Any = ...) -> Any:
 
 
 def member(path: str, default: Any = ...) -> Any:
-    """Return a value of an output, with the unit and the meaning that the library's list gives
-    it."""
+    """Return a member for a value of an output, with the unit and the meaning from the library's
+    list."""
     return _described(MEMBERS[path], default)
 
 
 def _included(number: Any, ending: str) -> Any:
-    """Make the model of what ``include`` asks for: of numbers, or of columns.
+    """Return the model of the values that ``include`` asks for: of numbers, or of columns.
 
-    Values whose paths have two steps stand in a model of their own, such as ``PowerBound``.
+    Values whose paths have two steps are in their own model, such as ``PowerBound``.
     """
     members: dict[str, Any] = {}
     for output in OUTPUTS.values():
@@ -48,7 +49,7 @@ def _included(number: Any, ending: str) -> Any:
             part, _, name = path.partition(".")
             if not name:
                 members[part] = number | None, _described(one, None)
-            elif name in ("y0", AMPLITUDE):  # whichever the direction has
+            elif name in ("y0", AMPLITUDE):  # whichever of the two the direction has
                 of_part[part][name] = number | None, _described(one, None)
             else:
                 of_part[part][name] = number, _described(one)
@@ -61,7 +62,7 @@ def _included(number: Any, ending: str) -> Any:
 
 
 def _answer(name: str, included: Any, about: str, number: Any, regime: Any, source: Any) -> Any:
-    """Make the model of the default answer and what ``include`` adds."""
+    """Return the model of the default answer and of what ``include`` adds."""
     output_paths = {path for output in OUTPUTS.values() for path in output.members}
     members: dict[str, Any] = {
         path: (number | None, _described(one, None)) if path in BAND else (number, _described(one))
@@ -109,7 +110,7 @@ class HarmonicRead(BaseModel):
 
 
 class Understood(BaseModel):
-    """What was understood of one input."""
+    """How the program understood one input."""
 
     text: str | None = Field(description="As it came; null where it was a number")
     value: float | Literal["rigid"] = Field(description="In SI; of an interval its middle")
@@ -123,7 +124,7 @@ class Understood(BaseModel):
 
 
 class ModelRow(BaseModel):
-    """One thing that the model leaves out, see docs/validity.md."""
+    """One effect that the model leaves out, see docs/validity.md."""
 
     row: str = Field(description="Its name")
     text: str = Field(description="What it does here")
@@ -144,7 +145,7 @@ _UNDERSTOOD = "Only if requested: what was understood of each input"
 
 
 def understood_inputs() -> Any:
-    """Return the member of an answer with what was understood."""
+    """Return the member of an answer that tells how the program understood the inputs."""
     return Field(None, description=_UNDERSTOOD)
 
 
@@ -173,7 +174,7 @@ class BatchFault(BaseModel):
 
 
 class BatchAnswered(Answered):
-    """What is said of a batch as a whole."""
+    """Statements about a whole batch."""
 
     errors: list[BatchFault] = Field(
         description="One entry per bad case, in order; the first 1000 of them"
@@ -183,11 +184,11 @@ class BatchAnswered(Answered):
 
 
 class ColumnsAnswer(Columns, BatchAnswered):  # type: ignore[misc, valid-type]
-    """Answer to a batch in columns, order kept; null: a bad case."""
+    """Answer to a batch in columns, in the same order; a bad case has null."""
 
 
 class RowsAnswer(BatchAnswered):
-    """Answer to a batch in rows, order kept; null where a case is bad."""
+    """Answer to a batch in rows, in the same order; a bad case has null."""
 
     results: list[Result | None]  # type: ignore[valid-type]
 
@@ -253,7 +254,7 @@ class Reachable(BaseModel):
 
 
 class Solved(BaseModel):
-    """The roots of every target, what was searched, and what is reachable there."""
+    """The roots of every target, the range of the search, and the reachable values."""
 
     results: list[TargetAnswer] = Field(description="One per target, in order")
     range: list[float | None] = Field(description="The searched range [SI]; null: without limit")
@@ -302,7 +303,7 @@ class MotionTargetAnswer(BaseModel):
 
 
 class SolveMotionAnswer(BaseModel):
-    """Answer to the inverse problem of a motion; it is computed, no table is read."""
+    """Answer to the inverse problem of a motion; it is computed without a table."""
 
     unknown: str
     unit: str
@@ -321,7 +322,7 @@ class SolveMotionAnswer(BaseModel):
 
 
 class StiffnessAnswer(BaseModel):
-    """What a contact of two bodies is; ``k`` and ``contact`` are those of a case."""
+    """Contact of two bodies; ``k`` and ``contact`` are members of a case."""
 
     geometry: str
     k: float = Field(description="Tangential stiffness while everything sticks [N/m]")
@@ -341,13 +342,13 @@ class StiffnessAnswer(BaseModel):
 
 # --- fit ------------------------------------------------------------------------------------------
 
-# an enumeration: a client of openapi-python-client takes a constant for the only value there is
+# an enumeration, because openapi-python-client takes a constant for the only possible value
 _Rigid = Annotated[Literal["rigid"], WithJsonSchema({"type": "string", "enum": ["rigid"]})]
 _Stiffness = float | _Rigid | None
 
 
 class FittedValues(BaseModel):
-    """k [N/m], or rigid, and mu0 [-], those that were unknown."""
+    """k [N/m] (or rigid) and mu0 [-], if they were unknown."""
 
     k: _Stiffness = None
     mu0: float | None = None
@@ -360,7 +361,7 @@ class Solution(FittedValues):
 
 
 class Interval(BaseModel):
-    """What the points say of each unknown; those that were not unknown are left out."""
+    """Interval of each unknown; a known value is left out."""
 
     k: list[_Stiffness] | None = None
     mu0: list[float | None] | None = None
@@ -376,7 +377,7 @@ class FittedCurve(BaseModel):
 
 
 class FitAnswer(Answered):
-    """What measured points say about a contact."""
+    """Result of a fit to measured points."""
 
     values: FittedValues
     std: FittedValues = Field(
@@ -412,7 +413,7 @@ class FitAnswer(Answered):
 
 
 class PointsAnswer(BaseModel):
-    """What was read of a table of points, without a fit."""
+    """Points as they were read from a table, without a fit."""
 
     columns: dict[str, list[float]] = Field(
         description="By name, in the units of the table", examples=[{"v0": [1.0, 5.0]}]

@@ -1,7 +1,8 @@
-"""The inputs of one case, and of many in columns: meaning, unit, bound and example of each.
+"""Define the inputs of one case, and of many cases in columns: meaning, unit, bound and example of
+each.
 
-Bounds of one input are checked here; relations between inputs (omega or f, k or an interval of it,
-the amplitude of the direction) are the library's, which refuses them when it is asked.
+The bounds of one input are checked here.  The library checks relations between inputs (omega or f,
+k or its interval, the amplitude of the direction) when it evaluates.
 """
 
 import math
@@ -51,7 +52,7 @@ from .values import (
     stiffness_inputs,
 )
 
-#: what a case may hold, in the order in which it is described
+#: members of a case, in the order of the description
 INPUTS = (
     "mu0",
     "Fz",
@@ -66,7 +67,7 @@ INPUTS = (
 )
 #: the first case of the documentation: mu_macro = 0.2405
 EXAMPLE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.01}
-MAX_REASONS = 1000  # bad cases of a batch that are listed
+MAX_REASONS = 1000  # largest number of bad cases of a batch that are listed
 
 Name = Literal["mu0", "Fz", "k", "y0", "omega", "f", "v0", "Fz_amplitude"]
 OR_RIGID = [{"type": "number", "exclusiveMinimum": 0}, RIGID_SCHEMA]
@@ -76,17 +77,18 @@ NULL = {"type": "null"}
 
 
 def optional(description: str, **keywords: Any) -> Any:
-    """Return a member that may be left out; null says the same, but for a query, which has none."""
+    """Return a member that may be left out; null means the same, except in a query, which has no
+    null."""
     return Field(None, description=description, json_schema_extra=_or_null, **keywords)
 
 
 def either(description: str, **keywords: Any) -> Any:
-    """Return a member that another one may stand for; null is refused."""
+    """Return a member that another member may replace; null is refused."""
     return Field(None, description=description, json_schema_extra=without_null, **keywords)
 
 
 def without_null(schema: dict[str, Any]) -> None:
-    """Describe a member that is no null."""
+    """Change the schema of a member so that it excludes null."""
     schema.pop("default", None)
     kinds = [kind for kind in schema.pop("anyOf", [schema]) if kind != NULL]
     schema |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
@@ -102,7 +104,7 @@ def _or_null(schema: dict[str, Any]) -> None:
 
 
 class Strict(BaseModel):
-    """A model with its own members only, each of its own type."""
+    """Accept only a model's own members, each of its own type."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
@@ -117,28 +119,28 @@ _AMPLITUDE = described("Fz_amplitude", ": for direction normal in place of y0")
 
 
 def _given_together(*names: str) -> dict[str, Any]:
-    """Return the schema of members that are all given: there, and no null."""
+    """Return the schema for members that must all be there and not null."""
     return {"required": [*names], "properties": {name: {"not": NULL} for name in names}}
 
 
 def one_of(*names: str) -> dict[str, Any]:
-    """Return the schema of alternatives: exactly one of these members is given."""
+    """Return the schema of alternatives: exactly one of these members is there."""
     return {"oneOf": [_given_together(name) for name in names]}
 
 
 def not_both(one: str, other: str) -> dict[str, Any]:
-    """Return the schema of two members of which one at most is given."""
+    """Return the schema of two members of which at most one is there."""
     return {"not": _given_together(one, other)}
 
 
 def both_or_none(one: str, other: str) -> dict[str, Any]:
-    """Return the schema of two members of which each needs the other."""
+    """Return the schema of two members that need each other."""
     neither = {"not": {"anyOf": [_given_together(one), _given_together(other)]}}
     return {"anyOf": [_given_together(one, other), neither]}
 
 
 ONE_FREQUENCY = one_of("omega", "f")
-#: what is given of every case, beside what is always required
+#: members of every case, in addition to the ones that are always required
 ALTERNATIVES: Any = {
     "allOf": [
         one_of("k", "k_low"),
@@ -147,7 +149,7 @@ ALTERNATIVES: Any = {
         both_or_none("k_low", "k_high"),
     ]
 }
-#: the same of a case whose unknown or swept input is left out
+#: the same for a case whose unknown or swept input is left out
 NOT_BOTH: Any = {
     "allOf": [
         not_both("k", "k_low"),
@@ -175,12 +177,12 @@ class CaseInputs(Strict):
 
     @property
     def inputs(self) -> dict[str, Any]:
-        """Those that are given, by name; a rigid contact is infinite."""
+        """Return the inputs that are there, by name; a rigid contact is infinite."""
         return _inputs_of(self)
 
 
 class OtherInputs(Strict):
-    """The inputs of a question about one of them, which is left out or null."""
+    """Inputs of a question about one of them, which is left out or null."""
 
     mu0: Friction | None = optional(_MU0, examples=[0.3])
     Fz: Force | None = optional(_FZ, examples=[10.0])
@@ -195,7 +197,8 @@ class OtherInputs(Strict):
 
     @property
     def inputs(self) -> dict[str, Any]:
-        """Those that are given, by name; a rigid contact is infinite, and a null in k stays."""
+        """Return the inputs that are there, by name; a rigid contact is infinite, and a null in k
+        stays."""
         inputs = _inputs_of(self)
         if self.k is None and "k" in self.model_fields_set:
             inputs["k"] = None
@@ -203,7 +206,7 @@ class OtherInputs(Strict):
 
 
 def _inputs_of(model: BaseModel) -> dict[str, Any]:
-    """Return the inputs that are given, by name; an interval in k by both of its ends."""
+    """Return the inputs that are there, by name; an interval in k becomes its two ends."""
     values = model.__dict__
     inputs = {name: values[name] for name in INPUTS if values.get(name) is not None}
     return inputs | stiffness_inputs(inputs.pop("k")) if type(inputs.get("k")) is str else inputs
@@ -213,8 +216,8 @@ def _inputs_of(model: BaseModel) -> dict[str, Any]:
 
 
 class Column(NamedTuple):
-    """One input of many cases: numbers, NaN where there is none, and why there is none, by the
-    index of the case."""
+    """Hold one input of many cases: numbers, with NaN for a missing one, and by the index of the
+    case the reason why it is missing."""
 
     numbers: Array
     reasons: Mapping[int, str]
@@ -228,19 +231,19 @@ _NO_TEXTS = "must be numbers: a column has no texts; a text with a unit is for o
 
 
 def is_rigid(value: object) -> bool:
-    """Return whether a value is the word for a stiffness without limit."""
+    """Return whether a value is the word for an infinite stiffness."""
     return isinstance(value, str) and value.strip().lower() == RIGID
 
 
 def not_a_number(name: str, value: object) -> str:
-    """Return why a value that is no number is refused where programs send numbers."""
+    """Return the reason why a value that is not a number is refused where programs send numbers."""
     if name == "k" and isinstance(value, str):
         return "must be a number, or the word rigid, and no other text"
     return no_number(name, value)
 
 
 def entry(name: str, value: object) -> tuple[float, str | None]:
-    """Return the number of an input and None, or NaN and the reason why there is none."""
+    """Return the number of an input and None, or NaN and the reason why there is no number."""
     if name == "k" and is_rigid(value):
         return math.inf, None
     if type(value) not in _NUMBERS:
@@ -255,7 +258,7 @@ def entry(name: str, value: object) -> tuple[float, str | None]:
 
 
 def column(name: str, values: Sequence[Any]) -> Column:
-    """Return a list as a column. A number beyond double range is never a rigid contact."""
+    """Return a list as a column.  A number beyond double range never becomes a rigid contact."""
     if _NUMBERS.issuperset(map(type, values)):
         try:
             array = np.array(values, np.float64)
@@ -273,11 +276,12 @@ def column(name: str, values: Sequence[Any]) -> Column:
     return Column(numbers, reasons)
 
 
-_ALWAYS = ("mu0", "Fz", "k", "v0")  # where null is refused
+_ALWAYS = ("mu0", "Fz", "k", "v0")  # these refuse null
 
 
 def cells(name: str, value: Any) -> float | Column | None:
-    """Return a number for all cases, or a list or an array with one for each."""
+    """Return one number for all cases, or a column from a list or an array with a number for
+    each."""
     if isinstance(value, list):
         return column(name, value)
     if isinstance(value, np.ndarray):
@@ -295,7 +299,7 @@ def _of_cases(value: Any, info: ValidationInfo) -> float | Column | None:
 
 
 def _one_word(value: Any, info: ValidationInfo) -> Any:
-    """Return the one word that a list of words holds, and another value as it is."""
+    """Return the word if a list has the same word everywhere; return any other value unchanged."""
     if not isinstance(value, list) or not all(isinstance(word, str) for word in value):
         return value
     try:
@@ -305,8 +309,8 @@ def _one_word(value: Any, info: ValidationInfo) -> Any:
 
 
 def _or_listed(one: dict[str, Any], *texts: dict[str, Any]) -> WithJsonSchema:
-    """Return one number for all cases, which ``texts`` describe, too, or a list of any, where a bad
-    entry spoils its case only."""
+    """Return the schema of one number for all cases (``texts`` describe it, too), or of a list of
+    any values, where a bad entry affects only its case."""
     several = {"type": "array", "items": {"anyOf": [one, {"type": "string"}, NULL]}}
     return WithJsonSchema({"anyOf": [one, *texts, several]})
 
@@ -321,15 +325,15 @@ StiffnessColumn = Annotated[Any, _CELLS, _or_listed(_ABOVE_ZERO, RIGID_SCHEMA)]
 
 
 DeviationColumn = Annotated[Any, _CELLS, _or_listed(_FROM_ZERO)]
-#: one for all cases; a list of one word repeated is that word
+#: one word for all cases; a list that repeats one word is this word
 ContactColumn = Annotated[ContactName, BeforeValidator(_one_word)]
 DirectionColumn = Annotated[DirectionName, BeforeValidator(_one_word)]
 
 
 class InputColumns(Strict):
-    """Cases in columns: lists of one length, and a plain number holds for every case.
+    """Cases in columns: lists of one length; a plain number is the same for every case.
 
-    An entry that is no legal number spoils its own case only.
+    A bad entry affects only its own case.
     """
 
     mu0: PositiveColumn = Field(description=_MU0)
@@ -345,6 +349,6 @@ class InputColumns(Strict):
 
     @property
     def columns(self) -> dict[str, Any]:
-        """What is given, by name."""
+        """Return the members that are there, by name."""
         values = self.__dict__
         return {name: x for name in INPUTS if (x := values[name]) is not None}

@@ -1,4 +1,4 @@
-"""Any periodic motion: what is asked, and its steady cycle."""
+"""Define the request for a periodic motion, and the answer with its steady cycle."""
 
 from typing import Annotated, Any, Literal, Self
 
@@ -36,12 +36,12 @@ from .values import (
     text_schema,
 )
 
-MAX_TERMS = 10  # harmonics of one part of the motion
-# the highest harmonic and the least tolerance of a ball: each of its hundreds of springs follows
-# every turn of the motion
+MAX_TERMS = 10  # largest number of harmonics in one part of the motion
+# the highest harmonic and the smallest tolerance of a ball, because each of its hundreds of springs
+# follows every turn of the motion
 MOST_OF_A_BALL, LEAST_OF_A_BALL = 20, 1e-7
-MOTIONS_OF_A_SEARCH = 150  # that solve_motion computes, about
-# costs, see service/admission.py: found with random motions, right to a factor of 10
+MOTIONS_OF_A_SEARCH = 150  # approximate number of motions that solve_motion computes
+# costs, see service/admission.py: measured with random motions, right within a factor of 10
 _COST, _COST_OF_A_TERM, _SPRINGS_OF_A_BALL = 4000.0, 400.0, 250.0
 
 
@@ -56,7 +56,8 @@ _Harmonic = Annotated[
     BeforeValidator(_whole),
     WithJsonSchema({"type": "integer", "minimum": 1, "maximum": MOST_HARMONIC}),
 ]
-_POSITIVE = WithJsonSchema({"type": "number", "exclusiveMinimum": 0})  # the library has the reason
+# the library gives the reason
+_POSITIVE = WithJsonSchema({"type": "number", "exclusiveMinimum": 0})
 _HERTZ = WithJsonSchema({"type": "number", "exclusiveMinimum": 0, "maximum": MOST_HZ})
 _Degrees = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -80,8 +81,8 @@ _Text = Annotated[str, WithJsonSchema(text_schema("length", False))]
 
 
 def _of_its_form(value: Any, _: Any, info: ValidationInfo) -> Any:
-    """Return the oscillation as the library takes it; a union would report the faults of every
-    form."""
+    """Return the oscillation as the library takes it. (A union would report the faults of every
+    form.)"""
     name = info.field_name or ""
     if isinstance(value, str):
         try:
@@ -103,7 +104,7 @@ def _of_its_form(value: Any, _: Any, info: ValidationInfo) -> Any:
 
 
 def _pair_of_numbers(name: str, pair: list[Any]) -> list[Any]:
-    """Return an amplitude and its phase as numbers, where they are texts."""
+    """Return an amplitude and its phase as numbers, also if they are texts."""
     numbers = [*pair]
     for i, kind in enumerate((QUANTITY_OF[name], "angle")[: len(pair)]):
         if isinstance(pair[i], str):
@@ -112,7 +113,8 @@ def _pair_of_numbers(name: str, pair: list[Any]) -> list[Any]:
 
 
 def _number(name: str, text: str, kind: str, place: tuple[str | int, ...]) -> float:
-    """Return the number of a text in SI, refused at its place within the oscillation."""
+    """Return the number of a text in SI; refuse a bad text with its place within the
+    oscillation."""
     try:
         return read_one(name, text, kind)
     except InputError as error:
@@ -121,8 +123,8 @@ def _number(name: str, text: str, kind: str, place: tuple[str | int, ...]) -> fl
 
 
 def _with_numbers(name: str, part: dict[str, Any], place: tuple[int, ...]) -> dict[str, Any]:
-    """Return a part with numbers for amplitude and phase that are texts, such as "2um" and "90
-    deg"."""
+    """Return a part in which amplitude and phase are numbers, also if they are texts such as "2um"
+    and "90 deg"."""
     numbers = dict(part)
     for member, kind in (("amplitude", QUANTITY_OF[name]), ("phase", "angle")):
         if isinstance(part.get(member), str):
@@ -140,8 +142,8 @@ FORMS = (
 
 
 def cost_of(contact: str, *parts: Any) -> float:
-    """Return the cost of a motion, see :mod:`service.admission`: each term is followed through
-    every turn of the highest harmonic."""
+    """Return the cost of a motion, see :mod:`service.admission`: the number of terms times the
+    turns of the highest harmonic."""
     terms = [one for part in parts if isinstance(part, list) for one in part]
     plain = sum(isinstance(part, (float, tuple)) for part in parts)
     highest: int = max([1, *(harmonic for harmonic, *_ in terms)])
@@ -211,12 +213,12 @@ class MotionRequest(Strict):
 
     @property
     def cost(self) -> float:
-        """The cost of the answer, see :mod:`service.admission`."""
+        """Return the cost of the answer, see :mod:`service.admission`."""
         return cost_of(self.contact, self.x, self.y, self.normal)
 
     @property
     def case(self) -> dict[str, Any]:
-        """The arguments of ``mumacro.motion`` that are given."""
+        """Return the arguments of ``mumacro.motion`` that are there."""
         values = self.__dict__
         of_answer = ("cycle", "include")
         return {name: x for name, x in values.items() if name not in of_answer and x is not None}
@@ -234,7 +236,7 @@ class CycleColumns(BaseModel):
 
 
 class MotionAnswer(BaseModel):
-    """The steady cycle of a motion; it is computed, no table is read.
+    """Steady cycle of a motion; it is computed without a table.
 
     A mean force may be negative.
     """

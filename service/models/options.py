@@ -1,4 +1,4 @@
-"""What is asked beside the inputs: which contact and table, what else is computed."""
+"""Define the options of a request: the contact, the table, and the outputs."""
 
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -28,8 +28,8 @@ from .inputs import (
 )
 from .values import OR_ONE, Deviation, Positive, fault
 
-MODEL = "model"  # for one case only
-_BESIDE = (MODEL, UNDERSTOOD)  # what the library does not compute
+MODEL = "model"  # only for one case
+_BESIDE = (MODEL, UNDERSTOOD)  # options that the library does not compute
 if TYPE_CHECKING:
     Include = str
 else:
@@ -46,7 +46,7 @@ _TOLERANCE = "Error of mu_macro/mu0 [-]: the smallest loaded table that meets it
 
 
 class Choice(Strict):
-    """Which contact, which direction, which table; a model of these checks its ``kind``."""
+    """Contact, direction and table; a model of these checks its ``kind``."""
 
     contact: ContactName = Field("spring", description=_CONTACT)
     direction: DirectionName = Field("across", description=_DIRECTION)
@@ -54,12 +54,13 @@ class Choice(Strict):
 
     @cached_property
     def kind(self) -> Kind:
-        """Contact and direction; InputError where they do not go together."""
+        """Return contact and direction.  Raise InputError if they do not go together."""
         return kind_of(self.contact, self.direction)
 
     @property
     def words(self) -> dict[str, Any]:
-        """Contact and direction as the library takes them, where they are not the usual ones."""
+        """Return contact and direction as the library takes them, if they are not the default
+        ones."""
         words: dict[str, Any] = {}
         if self.contact != "spring":
             words["contact"] = self.contact
@@ -69,7 +70,7 @@ class Choice(Strict):
 
 
 def _deviation(name: str, condition: str = "") -> str:
-    """Return what a deviation is, in the unit of its input."""
+    """Return the meaning of a deviation, in the unit of its input."""
     return f"Standard deviation of {name} [{unit_of(name)}], of independent errors{condition}"
 
 
@@ -87,13 +88,13 @@ class Deviations(Strict):
 
     @property
     def deviations(self) -> dict[str, Any]:
-        """Those that are given, by name."""
+        """Return the deviations that are there, by name."""
         names = self.model_fields_set & DEVIATIONS.keys()
         return {name: x for name in names if (x := getattr(self, name)) is not None}
 
 
 class DeviationColumns(Strict):
-    """The same of many cases: one value for all of them, or lists with one for each."""
+    """Deviations of many cases: one value for all of them, or lists with one for each."""
 
     std_mu0: DeviationColumn = optional(_deviation("mu0"))
     std_Fz: DeviationColumn = optional(_deviation("Fz"))
@@ -106,7 +107,7 @@ class DeviationColumns(Strict):
 
 
 class Outputs(Strict):
-    """What is computed beside the default answer."""
+    """Outputs in addition to the default answer."""
 
     include: Annotated[list[Include], Field(max_length=16), OR_ONE] = either(
         f"{_INCLUDE}; in a query joined by commas"
@@ -114,22 +115,22 @@ class Outputs(Strict):
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """The names that the library knows."""
+        """Return the names that the library knows."""
         return tuple(name for name in self.include or () if name not in _BESIDE)
 
     @property
     def beside(self) -> list[str]:
-        """The others: ``model`` and ``inputs``."""
+        """Return the names that the library does not know: ``model`` and ``inputs``."""
         return [name for name in self.include or () if name in _BESIDE]
 
     @property
     def model(self) -> bool:
-        """Whether remarks on the model are wanted."""
+        """Return whether remarks on the model are wanted."""
         return MODEL in (self.include or ())
 
     @property
     def understood(self) -> bool:
-        """Whether it is wanted what was understood of the inputs."""
+        """Return whether the answer must tell how the program understood the inputs."""
         return UNDERSTOOD in (self.include or ())
 
 
@@ -159,7 +160,7 @@ class Case(Deviations, CaseInputs):
 
     @property
     def values(self) -> dict[str, Any]:
-        """All that the library takes."""
+        """Return all members that the library takes."""
         words = {"contact": self.contact, "direction": self.direction}
         members = {name: word for name, word in words.items() if word is not None}
         return self.inputs | members | self.deviations
@@ -189,7 +190,7 @@ class CaseColumns(DeviationColumns, Outputs, Choice, InputColumns):
 
     @property
     def columns(self) -> dict[str, Any]:
-        """All that the library takes: numbers, and what lists hold."""
+        """Return all members that the library takes: numbers, and the content of lists."""
         words = {"contact": self.contact, "direction": self.direction}
         values = self.__dict__
         deviations = {name: x for name in DEVIATIONS if (x := values[name]) is not None}
@@ -200,7 +201,7 @@ class CaseColumns(DeviationColumns, Outputs, Choice, InputColumns):
 
 
 class BatchOptions(Deviations, Outputs):
-    """The options of a batch as a query; what is in the body is left out here."""
+    """Options of a batch as a query; what is in the body is left out here."""
 
     contact: ContactName | None = optional(_CONTACT)
     direction: DirectionName | None = optional(_DIRECTION)
@@ -208,14 +209,14 @@ class BatchOptions(Deviations, Outputs):
 
     @property
     def members(self) -> dict[str, Any]:
-        """What is given, as in a body."""
+        """Return the members that are there, as in a body."""
         names = ("contact", "direction", "tolerance", "include")
         inputs = {name: value for name in names if (value := getattr(self, name)) is not None}
         return inputs | self.deviations
 
 
 class TextQuery(CaseRequest):
-    """One case and the value that is wanted of its answer."""
+    """One case, and the name of the value that is wanted."""
 
     value: Annotated[str, BeforeValidator(str)] = Field(
         "mu_macro", description="Such as mu_macro, regime or power.saved"

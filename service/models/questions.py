@@ -1,4 +1,4 @@
-"""The bodies and queries of the questions: friction law, inverse problem, stiffness, fit."""
+"""Define the bodies and queries of the questions: friction law, inverse problem, stiffness, fit."""
 
 import math
 from base64 import b64decode
@@ -40,7 +40,7 @@ from .motion import FORMS, Oscillation
 from .options import Choice, Deviations, Options
 from .values import OR_ONE, End, Length, Load, Modulus, Ratio, Start, Stop, fault, text_schema
 
-MAX_VALUES = 10_001  # values of a law, at most
+MAX_VALUES = 10_001  # largest number of values of a law
 _OF_A_MOTION = ("mu0", "Fz", "k", "omega", "f", "v0", "contact")
 _NOT_OF_A_MOTION = (
     "y0",
@@ -53,9 +53,9 @@ _NOT_OF_A_MOTION = (
     "stiffness_exponent",
 )
 MAX_TARGETS = 10_000
-MAX_POINTS = 1000  # points of a fit, at most: scipy answers it within seconds
+MAX_POINTS = 1000  # largest number of points in a fit: scipy answers it within seconds
 
-# JSON has one kind of number: in JSON and in a JSON Schema 55.0 is an integer
+# JSON has only one type of number: in JSON and in a JSON Schema 55.0 is an integer
 _AS_WHOLE = BeforeValidator(lambda n: int(n) if isinstance(n, float) and n.is_integer() else n)
 _Whole = Annotated[int, Field(ge=2, le=MAX_VALUES), _AS_WHOLE]
 _Exponent = Annotated[
@@ -88,7 +88,7 @@ class Sweep(Strict):
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Both ends in the SI unit of the swept input."""
+        """Return both ends in the SI unit of the swept input."""
         quantity = QUANTITY_OF[self.along]
         return read_one("start", self.start, quantity), read_one("stop", self.stop, quantity)
 
@@ -108,7 +108,7 @@ class LawRequest(Options, Sweep, OtherInputs):
     )
 
 
-# its error names the field, so that no schema of numbers >= 0 is needed
+# its error names the field, so no schema of numbers >= 0 is needed
 _TARGET: list[dict[str, Any]] = [{"type": "number"}, text_schema("ratio", False)]
 if TYPE_CHECKING:
     Unknown = str
@@ -117,7 +117,7 @@ else:
 
 
 class SolveForRequest(Options, OtherInputs):
-    """Which value of one input gives a wanted mu_macro; with x, y or normal over any motion."""
+    """Which value of one input gives a wanted mu_macro; with x, y or normal for any motion."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -170,19 +170,21 @@ class SolveForRequest(Options, OtherInputs):
 
     @property
     def is_motion(self) -> bool:
-        """Whether the question is about any motion."""
+        """Return whether the question is about a motion."""
         of_motions = (getattr(self, name) for name in (*PARTS, "of"))
         return "." in self.unknown or any(part is not None for part in of_motions)
 
     @property
     def motion(self) -> dict[str, Any]:
-        """The motion that is asked about; InputError for what a motion does not have."""
+        """Return the arguments of the motion.  Raise InputError for a member that a motion does not
+        have."""
         values = {
             name: value
             for name in self.model_fields_set
             if (value := getattr(self, name)) is not None
         }
-        if not (self.outputs or self.model):  # inputs, what was understood
+        # only inputs may be included: how the program understood them
+        if not (self.outputs or self.model):
             values.pop("include", None)
         for name in _NOT_OF_A_MOTION:
             if name in values:
@@ -241,7 +243,7 @@ class StiffnessRequest(Strict):
 
 
 def _of_points(value: Any, info: ValidationInfo) -> Any:
-    """Return a number or a text, or an array of them, as an array in SI; the word rigid in k is
+    """Return a number, a text, or a list of them as an array in SI; the word rigid in k is
     infinite."""
     name = info.field_name or ""
     entries = value if isinstance(value, list) else [value]
@@ -260,7 +262,7 @@ def _of_points(value: Any, info: ValidationInfo) -> Any:
 
 
 def _of_point(name: str, value: Any) -> tuple[float, str | None]:
-    """Return one number in SI, or the reason why it is none."""
+    """Return one number in SI, or the reason why it is not a number."""
     if type(value) not in (int, float, str):
         return math.nan, no_number(name, value)
     try:
@@ -378,7 +380,7 @@ class FitRequest(Choice):
 
     @property
     def columns(self) -> dict[str, Any]:
-        """The columns that are given, by name; a null in k stays, unless k is fitted."""
+        """Return the columns that are there, by name; a null in k stays, unless k is fitted."""
         columns = {name: value for name in _COLUMNS if (value := getattr(self, name)) is not None}
         if "k" in self.model_fields_set and self.k is None and "k" not in self.unknowns:
             raise InputError("k", None, STIFFNESS)
@@ -386,7 +388,7 @@ class FitRequest(Choice):
 
     @property
     def table(self) -> tuple[str, bytes] | None:
-        """The member that holds a table, and its bytes; None where there is none."""
+        """Return the member that holds a table, and its bytes; None if there is no table."""
         if self.points is not None:
             return "points", self.points.encode("utf-8", "surrogatepass")
         if self.points_base64 is None:
@@ -398,7 +400,7 @@ class FitRequest(Choice):
 
     @property
     def dialect(self) -> Dialect:
-        """How the table is written, as far as it is said."""
+        """Return how the table is written, as far as the request says."""
         return Dialect(
             None if self.sep is None else SEPARATORS[self.sep],
             self.decimal,

@@ -1,7 +1,8 @@
-"""The types of values: a number in SI, or a text as the library reads it, such as ``"1 N/um"``.
+"""Define the types of values: a number in SI, or a text as the library reads it, such as ``"1
+N/um"``.
 
-A text is checked here, so that all faults of a request are told at once, and is handed to the
-library as it came: what it says beside its number, a deviation or an interval, is not lost.
+A text is checked here, so that all faults of a request are reported at once.  It is then given to
+the library unchanged, because it may hold more than a number: a deviation or an interval.
 """
 
 import math
@@ -20,11 +21,11 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Hertz = Annotated[float, Field(ge=0, le=MOST_HZ, allow_inf_nan=False)]
 RIGID_SCHEMA = {"const": "rigid", "type": "string"}
-#: a number as text; the library reads more than this pattern
+#: a number as text; the library accepts more than this pattern
 PLAIN_TEXT = {"type": "string", "pattern": r"^[0-9]{1,9}(\.[0-9]{1,9})?$"}
 
 
-#: one name in place of a list of one
+#: one name instead of a list with one name
 OR_ONE = BeforeValidator(lambda value: [value] if isinstance(value, str) else value)
 
 
@@ -34,7 +35,7 @@ def fault(reason: str) -> PydanticCustomError:
 
 
 def _checked(value: Any, number: Callable[[Any], float], info: ValidationInfo) -> Any:
-    """Return a number as it is, and a text that the library can read."""
+    """Return a number unchanged, or a text that the library can read."""
     if type(value) is not str:
         return number(value)
     name = (info.field_name or "").removeprefix("std_")
@@ -48,8 +49,7 @@ def _checked(value: Any, number: Callable[[Any], float], info: ValidationInfo) -
 
 
 def _in_si(value: Any, number: Callable[[Any], float], info: ValidationInfo) -> Any:
-    """Return a number in SI from a number or a text, where deviations and intervals mean
-    nothing."""
+    """Return a number in SI from a number or a text; a deviation or an interval is refused."""
     if type(value) is not str:
         return number(value)
     _checked(value, number, info)
@@ -60,7 +60,7 @@ def _in_si(value: Any, number: Callable[[Any], float], info: ValidationInfo) -> 
 
 
 def text_schema(quantity: str, positive: bool) -> dict[str, Any]:
-    """Return the JSON Schema of a text, for clients: the library reads more than its pattern."""
+    """Return the JSON Schema of a text, for clients; the library accepts more than its pattern."""
     digits = r"[1-9][0-9]{0,8}" if positive else r"[0-9]{1,9}"
     about = QUANTITIES[quantity]
     units = about.such_as.replace(":", ",").replace(";", ",").split(", ")
@@ -86,19 +86,19 @@ def _is(name: str, positive: bool, example: float | None = None, **bounds: bool)
 
 
 _CHECKED, _IN_SI = WrapValidator(_checked), WrapValidator(_in_si)
-# values of inputs: a text stays one
+# values of inputs: a text stays a text
 Friction = Annotated[Positive, _CHECKED, _is("mu0", True, 0.3)]
 Force = Annotated[Positive, _CHECKED, _is("Fz", True, 10.0)]
 Stiffness = Annotated[Positive, _CHECKED, _is("k", True, 1e6)]
-#: of a contact that is not rigid; an end of an interval stands in place of k, so the example of a
-#: whole request has none
+#: stiffness of an elastic contact; an end of an interval replaces k, so the example of a whole
+#: request has none
 StiffnessEnd = Annotated[Positive, _CHECKED, _is("k", True, rigid=False)]
 Amplitude = Annotated[NotNegative, _CHECKED, _is("y0", False, 2e-6)]
 ForceAmplitude = Annotated[NotNegative, _CHECKED, _is("Fz_amplitude", False)]
 AngularFrequency = Annotated[NotNegative, _CHECKED, _is("omega", False)]
 Frequency = Annotated[Hertz, _CHECKED, _is("f", False, 20e3)]
 Speed = Annotated[NotNegative, _CHECKED, _is("v0", False, 0.01)]
-#: beside a law, which sweeps v0 unless another input is named, so the example has none
+#: in a law, which sweeps v0 unless the request names another input, so the example has no v0
 OtherSpeed = Annotated[NotNegative, _CHECKED, _is("v0", False)]
 #: a standard deviation, in the unit of its input
 Deviation = Annotated[
@@ -107,7 +107,7 @@ Deviation = Annotated[
     WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0}, PLAIN_TEXT]}),
 ]
 _END: Any = {"anyOf": [{"type": "number", "minimum": 0}, PLAIN_TEXT]}
-#: an end of a range; the library reads a text with the input that it belongs to
+#: an end of a range; the library reads a text with the input to which it belongs
 End = Annotated[
     NotNegative,
     WrapValidator(lambda value, number: value if type(value) is str else number(value)),
@@ -120,7 +120,7 @@ Stop = Annotated[End, WithJsonSchema({**_END, "examples": [10.0]})]
 Length = Annotated[Positive, _IN_SI, _is("radius", True)]
 Modulus = Annotated[Positive, _IN_SI, _is("E", True)]
 Load = Annotated[Positive, _IN_SI, _is("Fz", True)]
-#: a share or a coefficient, which may be in per cent
+#: a fraction or a coefficient, which may be in per cent
 Ratio = Annotated[
     float,
     Field(allow_inf_nan=False),
@@ -130,7 +130,8 @@ Ratio = Annotated[
 
 
 def stiffness_inputs(k: str) -> dict[str, Any]:
-    """Return the inputs that a checked text gives: k, infinite where rigid, or both ends of it."""
+    """Return the inputs that a checked text gives: k, infinite for a rigid contact, or both ends of
+    it."""
     one = read("k", k)
     if one.low is not None:
         return dict(zip(ENDS, (one.low, one.high), strict=True))

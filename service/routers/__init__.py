@@ -1,4 +1,4 @@
-"""The endpoints, one router for each topic."""
+"""Define the endpoints, one router for each topic."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -51,13 +51,13 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
     }
 
 
-#: of every question in the query, and in the body
+#: options of every question, in the query and in the body
 GET_PROBLEMS = problems(400, 401, 422, 503)
 POST_PROBLEMS = problems(400, 401, 408, 413, 415, 422, 503)
 
 
 class _File(FileResponse):
-    """A file, or a part of it; a range outside the file is answered with problem details."""
+    """Send a file, or a part of it; a range outside the file is answered with problem details."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         size = self.headers["content-length"]
@@ -80,10 +80,10 @@ SMALL = 100_000  # bytes; the page's own files and libraries are smaller
 def file_answer(
     request: Request, path: Path, headers: Mapping[str, str], **options: Any
 ) -> Response:
-    """Return a file, the part of it that Range requests, or 304 if the client has it already;
-    OSError if it is gone.
+    """Return a file, the part of it that Range requests, or 304 if the client has it already.
+    Raise OSError if it is gone.
 
-    The ETag is that of the headers, or is made from the size and the modification time.
+    The ETag comes from the headers, or from the size and the modification time.
     """
     answer = _File(path, headers=headers, stat_result=path.stat(), **options)
     etag = answer.headers["etag"]
@@ -95,5 +95,5 @@ def file_answer(
         return Response(status_code=304, headers={**headers, "ETag": etag})
     if int(answer.headers["content-length"]) > SMALL or "range" in request.headers:
         return answer
-    # three turns of the thread pool that FileResponse takes cost more than to read a small file
+    # FileResponse uses the thread pool three times, which costs more than reading a small file
     return Response(path.read_bytes(), headers={**answer.headers}, **options)

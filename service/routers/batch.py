@@ -1,10 +1,10 @@
-"""Many cases at once: ``POST /v1/mu-macro/batch``, JSON columns or rows; the answer has the same
-form.
+"""Answer many cases at once: ``POST /v1/mu-macro/batch``, JSON columns or rows; the answer has the
+same form.
 
-A body is read whole, evaluated and answered in slices.  What is not small is read and computed in
-threads, with a slot that is kept until the last piece is sent.  These read one body at a time: it
-takes several times the memory of the arrays that it becomes, and since Python runs one thread at a
-time, several would be no faster and keep the loop waiting longer.
+A body is read whole, and evaluated and answered in slices.  If it is not small, threads read and
+compute it, with a slot that is kept until the last piece is sent.  The threads read one body at a
+time, because it takes several times the memory of its arrays, and because Python runs one thread at
+a time: several would be no faster and would keep the loop waiting longer.
 """
 
 import math
@@ -33,15 +33,15 @@ router = router_of("answers")
 T = TypeVar("T")
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
 _BYTES_PER_UNIT = 16  # bytes of a body whose reading has the cost 1, see service/admission.py
-# costs of reading a row, and a text or a null, where Python reads them one by one
+# costs of reading a row, and a text or a null, if Python reads them one by one
 _ROW, _WORD = 400.0, 40.0
 _READS = threading.Lock()
-# between two looks of a thread that waits to read whether it is to end
+# time between two checks of a waiting thread whether it must end
 _LOOK_EVERY_S = 0.05
 
 
 class _Answer(Response):
-    """Reads the body of a batch, and answers in pieces."""
+    """Read the body of a batch, and answer in pieces."""
 
     background = None
 
@@ -50,7 +50,7 @@ class _Answer(Response):
         self._fields: dict[bytes, bytes] = dict(request.scope["headers"])
         self._scope = request.scope
         self._patience: int = self._state.settings.client_timeout_s
-        # HTTP/1.0 knows no answer in pieces
+        # HTTP/1.0 has no answer in pieces
         self._piece = math.inf if request.scope["http_version"] == "1.0" else _PIECE
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -61,7 +61,7 @@ class _Answer(Response):
 
     async def _answer(self, receive: Receive, send: Send) -> None:
         async def run(work: Callable[[], T], cost: float) -> T:
-            """Do the work at once if it is small, else in a thread, so that it delays no other
+            """Do the work at once if it is small, otherwise in a thread, so that it delays no other
             request."""
             return (
                 work() if cost <= AT_ONCE else await ticket_of(self._scope).run(work, cost, receive)
@@ -78,8 +78,8 @@ class _Answer(Response):
         )
         if not text:
             raise RequestError(ProblemKind.MALFORMED_BODY, "the body is empty")
-        # Reading costs by the byte, computing by the case: a small body can request much
-        # computation.
+        # The cost of reading depends on the bytes, that of computing on the cases: a small body can
+        # request much computation.
         cost = len(text) / _BYTES_PER_UNIT
         of_reading = cost if cost > LONG else cost + _by_one(text)
         read_it = self._batch if of_reading <= AT_ONCE else self._batch_in_turn
@@ -117,14 +117,14 @@ class _Answer(Response):
 
 
 def _by_one(text: bytearray) -> float:
-    """Return the cost of reading what Python may have to read one by one; a null has two of its
-    l."""
+    """Return the cost of reading the values that Python may have to read one by one; a null has two
+    letters l."""
     words = (count(text, b'"') + count(text, b"l")) / 2
     return _ROW * count(text, b"{") + _WORD * words
 
 
 def _gathered(pieces: Iterator[bytes], least: float) -> Iterator[bytes]:
-    """Yield the same bytes in pieces of at least so many."""
+    """Yield the same bytes in pieces of at least this size."""
     parts, size = list[bytes](), 0
     for piece in pieces:
         parts.append(piece)
@@ -162,6 +162,6 @@ _ANSWER: Any = {
 async def post_mu_macro_batch(
     request: Request, options: Annotated[BatchOptions, Query()]
 ) -> Response:
-    """Answer columns with columns and rows with rows, order kept.  A bad case has the result null
-    and an entry in ``errors``."""
+    """Answer columns with columns and rows with rows, in the same order.  A bad case has the result
+    null and an entry in ``errors``."""
     return _Answer(request, options)

@@ -1,4 +1,5 @@
-"""One case: ``GET`` and ``POST /v1/mu-macro``, and ``GET /v1/mu-macro.txt`` for spreadsheets."""
+"""Answer one case: ``GET`` and ``POST /v1/mu-macro``, and ``GET /v1/mu-macro.txt`` for
+spreadsheets."""
 
 from functools import partial
 from typing import Annotated, Any
@@ -21,7 +22,7 @@ from ..understood import UNDERSTOOD, understood
 from . import GET_PROBLEMS, POST_PROBLEMS, router_of
 
 router = router_of("answers")
-#: members of a case of which nothing but the default is asked
+#: members of a case that asks only for the default answer
 _PLAIN = frozenset(("mu0", "Fz", "k", "y0", "omega", "f", "v0", "tolerance", "value"))
 _LARGE = 100  # cost, see service/admission.py, from which one case is computed in a thread
 _CACHED: Any = {
@@ -54,14 +55,15 @@ async def _answered(request: Request, case: CaseRequest) -> dict[str, Any]:
         if case.model:
             work = partial(_of_model, answer)
             members |= await compute(request, work)
-    except InputError as error:  # as with_members has it, which is a function more
+    except InputError as error:  # the same as with_members, without the call of a function
         raise of_input(error, **members) from None
     state.metrics.case(table, answer.source_code)
     return {**answer.to_dict(), **members, **table.signature}
 
 
 def _of_model(answer: Answer[float]) -> dict[str, Any]:
-    """Return rows of docs/validity.md on this case, and the digits that k supports."""
+    """Return the rows of docs/validity.md for this case, and the number of digits that the
+    uncertainty of k supports."""
     effect = effect_of(answer)
     return {MODEL: rows_of(answer, effect), "digits": digits(effect)}
 
@@ -72,7 +74,7 @@ def _of_model(answer: Answer[float]) -> dict[str, Any]:
     summary="Macroscopic friction of one case",
 )
 async def get_mu_macro(request: Request, case: Annotated[CaseRequest, Query()]) -> Response:
-    """Answer one case given as a query.  The answer can be cached."""
+    """Answer one case in a query.  The answer can be cached."""
     answer = await _answered(request, case)
     return Json(answer, headers=request.app.state.settings.cache_fields)
 
@@ -83,7 +85,7 @@ async def get_mu_macro(request: Request, case: Annotated[CaseRequest, Query()]) 
     summary="Macroscopic friction of one case, as JSON",
 )
 async def post_mu_macro(request: Request, case: CaseRequest) -> Response:
-    """Answer one case given as a JSON object; ``include`` adds quantities to the default answer."""
+    """Answer one case in a JSON object; ``include`` adds quantities to the default answer."""
     return Json(await _answered(request, case))
 
 

@@ -1,5 +1,5 @@
-"""A contact: ``POST /v1/stiffness``, from materials and geometry; ``POST /v1/fit``, from measured
-points."""
+"""Answer questions about a contact: ``POST /v1/stiffness``, from materials and geometry; ``POST
+/v1/fit``, from measured points."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -25,8 +25,8 @@ from ..tables import LoadedTable
 from . import POST_PROBLEMS, router_of
 
 router = router_of("answers")
-_FAULTS = 100  # lines of a table that an answer names
-#: the largest table of points: so many columns, and characters in a cell
+_FAULTS = 100  # largest number of bad lines of a table that an answer names
+#: largest table of points: columns, and characters in a cell
 MOST = Most(MAX_POINTS, columns=200, cell=200)
 
 
@@ -36,7 +36,7 @@ MOST = Most(MAX_POINTS, columns=200, cell=200)
     summary="The stiffness of a contact from materials and geometry",
 )
 async def post_stiffness(request: Request, contact: StiffnessRequest) -> Response:
-    """Return k, and the contact to ask for with it; the arguments of a geometry in SI."""
+    """Return k, and the contact to use with it; the arguments of a geometry are in SI."""
     members = await understood_in(request, bool(contact.include))
     with with_members(**members):
         arguments = contact.model_dump(exclude_none=True, exclude={"geometry", "include"})
@@ -51,7 +51,7 @@ async def post_stiffness(request: Request, contact: StiffnessRequest) -> Respons
     summary="k and mu0 from measured points",
 )
 async def post_fit(request: Request, measured: FitRequest) -> Response:
-    """Fit k and mu0 to measured points; infinite bounds are null, an infinite k is the word
+    """Fit k and mu0 to measured points; an infinite bound is null, an infinite k is the word
     rigid."""
     columns, source = measured.columns, measured.table
     table = request.app.state.tables.pick(measured.tolerance)
@@ -66,9 +66,9 @@ async def post_fit(request: Request, measured: FitRequest) -> Response:
 
 
 def _points(member: str, data: bytes, measured: FitRequest) -> TableOfNumbers:
-    """Return the points of a table; a request has what is wrong with its lines at ``member``."""
+    """Return the points of a table; a refusal names what is wrong in its lines, at ``member``."""
     try:
-        if data.startswith(WORKBOOK):  # a few kB of it may unpack to any size
+        if data.startswith(WORKBOOK):  # a few kB of a workbook may unpack to any size
             raise TextError("it is a workbook, or another zip file: save it as CSV")
         return read_points(data, measured.dialect, MOST)
     except TextError as error:

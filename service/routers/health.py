@@ -1,5 +1,5 @@
-"""The state of the service: ``/livez`` (the process answers), ``/readyz`` and ``/healthz`` (answers
-are correct), ``/metrics``."""
+"""Report the state of the service: ``/livez`` (the process answers), ``/readyz`` and ``/healthz``
+(answers are correct), ``/metrics``."""
 
 import asyncio
 from typing import Any
@@ -21,7 +21,8 @@ _READY: dict[int | str, Any] = {200: {"model": Health}, **problems(503)}
 
 @router.get("/livez", responses={200: {"model": Health}}, summary="The process is alive")
 async def livez() -> Response:
-    """Report that the process answers, also without a table: a restart would not repair a table."""
+    """Report that the process answers, also without a table, because a restart would not repair a
+    table."""
     return Json({"status": "alive", **_VERSIONS}, headers=_NO_STORE)
 
 
@@ -37,7 +38,7 @@ async def readyz(request: Request) -> Response:
 
 @router.get("/healthz", responses=_READY, summary="As /readyz")
 async def healthz(request: Request) -> Response:
-    """Answer as /readyz."""
+    """Answer as /readyz does."""
     return await readyz(request)
 
 
@@ -55,6 +56,6 @@ _COUNTERS: dict[int | str, Any] = {
     "/metrics", response_class=Response, responses=_COUNTERS, summary="Counters for Prometheus"
 )
 async def get_metrics(request: Request) -> Response:
-    """Return the counters of all worker processes, in the text form of Prometheus."""
+    """Return the counters of all worker processes, in the text format of Prometheus."""
     text = await asyncio.to_thread(request.app.state.metrics.text)  # without a slot
     return Response(text, headers={**_NO_STORE, "Content-Type": CONTENT_TYPE_LATEST})

@@ -1,4 +1,4 @@
-"""Any periodic motion: ``POST /v1/motion``.  It reads no table."""
+"""Answer any periodic motion: ``POST /v1/motion``.  It reads no table."""
 
 from dataclasses import fields
 from typing import Any
@@ -39,7 +39,7 @@ def _answered(scene: MotionRequest) -> dict[str, Any]:
     except InputError as error:
         if error.field in MotionRequest.model_fields:
             raise
-        # of a group of inputs, such as the speed: none of them is bad by itself
+        # a fault of several inputs together, such as the speed: no single one is bad
         refuse([FieldFault((), f"{error.field} {reason_of(error)}", error.value)])
     answer: dict[str, Any] = {name: getattr(motion, name) for name in _NUMBERS} | {
         "contact": scene.contact

@@ -1,7 +1,7 @@
-"""``/``: the page, a map of all cases with the user's point on it, and the friction law; ``/docs``:
-the description.
+"""Serve ``/``: the page with a map of all cases, the user's point on it, and the friction law; and
+``/docs``: the description.
 
-What is served from files holds no number of a table and loads nothing from elsewhere.
+These files hold no number of a table, and load nothing from other hosts.
 """
 
 from pathlib import Path
@@ -19,10 +19,10 @@ from . import file_answer
 STATIC = Path(__file__).resolve().parent.parent / "static"
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 _FRESH = {"Cache-Control": "no-cache"}
-# folders of libraries of others, which change with their versions only
+# folders of third-party libraries, which change only with their versions
 LIBRARIES = ("lib", "swagger-ui")
 _ONE_DAY = {"Cache-Control": "public, max-age=86400"}
-# Inline styles are allowed at /docs: the interface sets some on its elements.
+# Inline styles are allowed at /docs, because the interface sets some on its elements.
 _DOCS_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' "
     "data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -74,12 +74,12 @@ _FILES = {
     for paths in (ASSETS, *_VENDORED)
     for path in paths
 }
-# the documents as they are written, in a checkout whose guide is not built
+# the documents as text files, in a checkout whose guide is not built
 _SOURCE = Path(__file__).resolve().parent.parent.parent / "docs"
 _DOCUMENTS = {
     f"/documents/{path.relative_to(_SOURCE).as_posix()}": path for path in _SOURCE.rglob("*.md")
 }
-#: what needs no API key: the same for everyone, and without a number of a table
+#: paths without an API key: the same for everyone, and without a number of a table
 OPEN = ("/", "/docs", "/static/page/names.json", *_FILES, *_DOCUMENTS)
 
 
@@ -95,7 +95,7 @@ async def get_asset(request: Request, folder: str, name: str) -> Response:
 
 @router.get("/documents/{name:path}")
 async def get_document(request: Request, name: str) -> Response:
-    """Return a page of the documents as it is written."""
+    """Return a page of the documents as a text file."""
     path = _DOCUMENTS.get(f"/documents/{name}")
     if path is None:
         raise HTTPException(404)

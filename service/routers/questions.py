@@ -1,5 +1,5 @@
-"""Questions about a range of one input: its friction law, ``/v1/law`` and ``/v1/law.csv``, and
-``/v1/solve-for``."""
+"""Answer questions about a range of one input: its friction law, ``/v1/law`` and ``/v1/law.csv``,
+and ``/v1/solve-for``."""
 
 import csv
 import io
@@ -42,7 +42,7 @@ router = router_of("answers")
 
 
 def _law(question: LawRequest, table: LoadedTable) -> tuple[Law, dict[str, list[Any]]]:
-    """Return the library's law and all columns beside the swept input."""
+    """Return the library's law, and all its columns except the swept input."""
     case, along, (start, stop) = question.inputs, question.along, question.ends
     _refuse_model(question)
     law = mumacro.law(
@@ -77,7 +77,7 @@ def _answer_at(
     values: Array,
     stiffening: Stiffening | None,
 ) -> Answer[Any]:
-    """Return the answers at values of one input, with what is included."""
+    """Return the answers at values of one input, with the included outputs."""
     inputs = {name: value for name, value in question.inputs.items() if value is not None}
     inputs[unknown] = values
     if stiffening is not None:
@@ -120,7 +120,7 @@ _CSV = {"description": "The law", "content": {"text/csv": {"schema": {"type": "s
     summary="mu_macro over a range of one input, as a table",
 )
 async def get_law_csv(request: Request, question: Annotated[LawRequest, Query()]) -> Response:
-    """Return the law as CSV (RFC 4180), one row per value; the head names the columns with their
+    """Return the law as CSV (RFC 4180), one row per value; the header names the columns with their
     units."""
 
     def answer() -> Response:
@@ -166,7 +166,7 @@ def unit_at(path: str) -> str:
     summary="The value of one input that gives a wanted mu_macro",
 )
 async def post_solve_for(request: Request, question: SolveForRequest) -> Response:
-    """Return every root of every target.  A target out of reach has none; ``reachable`` is the
+    """Return every root of every target.  A target out of reach has no root; ``reachable`` is the
     range of mu_macro.  With ``x``, ``y`` or ``normal`` the question is about any motion."""
     members = await understood_in(request, question.understood)
     with with_members(**members):
@@ -179,7 +179,7 @@ async def post_solve_for(request: Request, question: SolveForRequest) -> Respons
 
 
 def _solved_motion(question: SolveForRequest) -> dict[str, Any]:
-    """Return the roots over a motion, which reads no table."""
+    """Return the roots for a motion; no table is needed."""
     motion, of = question.motion, question.of or "mu_macro"
     unit = _unit_of_target(question)
     solution = mumacro.solve_motion(
@@ -196,7 +196,7 @@ def _solved_motion(question: SolveForRequest) -> dict[str, Any]:
 
 
 def _unit_of_target(question: SolveForRequest) -> float:
-    """Return what a target is a multiple of: mu0, or 1."""
+    """Return the factor of a target: mu0, or 1."""
     if question.quantity == "mu_macro":
         return 1.0
     if question.unknown == "mu0" or question.mu0 is None:
@@ -231,8 +231,8 @@ def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
 
 
 def _in_quantity(question: SolveForRequest, answer: dict[str, Any], unit: float) -> dict[str, Any]:
-    """Return the library's answer with targets, and what is reachable, in the quantity that was
-    asked for."""
+    """Return the library's answer, with targets and reachable values in the quantity that the
+    request asks for."""
     _with_targets(question, answer["results"])
     reach = answer["reachable"]
     return answer | {"reachable": reach | {end: reach[end] / unit for end in ("min", "max")}}

@@ -1,4 +1,4 @@
-"""The table itself: ``/v1/table`` (metadata) and ``/v1/table.nc`` (the file)."""
+"""Serve the table itself: ``/v1/table`` (metadata) and ``/v1/table.nc`` (the file)."""
 
 from typing import Annotated, Any
 
@@ -64,8 +64,7 @@ _PARTS: dict[int | str, Any] = {
     summary="The table as a netCDF-4 file",
 )
 async def get_table_file(request: Request, query: Chosen) -> Response:
-    """Stream the file from disk; ranges are supported.  It is the file that the answers come
-    from."""
+    """Stream the file from disk; ranges are supported.  The answers come from this file."""
     tables = request.app.state.tables
     table = tables.pick(query.tolerance)
     await tables.check()  # a file that was replaced has another table of the same name
