@@ -79,7 +79,7 @@ class Batch:
             if isinstance(column, Column):
                 values[name] = column.numbers
                 for i, reason in column.reasons.items():
-                    reasons.setdefault(i, (name, reason))
+                    reasons.setdefault(i, Reason(name, reason))
         lengths = {name: len(x) for name, x in values.items() if isinstance(x, np.ndarray)}
         if len({*lengths.values()}) > 1:
             size = next(iter(lengths.values()))
@@ -130,4 +130,4 @@ class Batch:
 
 def _reason(cases: Cases, index: int) -> Reason:
     error = cases.reason(index)
-    return error.field, reason_of(error)
+    return Reason(error.field, reason_of(error))

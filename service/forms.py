@@ -13,7 +13,6 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from pydantic import ValidationError
 
 from mumacro.answer import TEXTS, Answer, nested
 from mumacro.errors import InputError
@@ -34,10 +33,7 @@ from mumacro.stopping import look
 from .json_text import NotRead, count, decode_batch, decode_columns, decode_rows, dump
 from .models.inputs import INPUTS, MAX_REASONS, entry
 from .models.options import Case, CaseColumns
-from .problems import FieldFault, ProblemKind, RequestError, faults_of, reason_of, refuse
-
-#: the bad field (None if the whole case is bad), and the reason
-Reason = tuple[str | None, str]
+from .problems import FieldFault, ProblemKind, RequestError, reason_of, refuse
 
 MORE_CASES = "send several requests, or give `mumacro eval` a file, or use Dask"
 SLICE = 8192  # number of cases that are computed and written at a time
@@ -45,8 +41,14 @@ _NUMBERS = (*INPUTS, *DEVIATIONS)  # members that hold numbers
 _WORDS = {"contact": CONTACTS, "direction": DIRECTIONS}  # members that hold words, and which words
 _REST = tuple(name for name in CaseColumns.model_fields if name not in _NUMBERS)
 _KNOWN = len(CaseColumns.model_fields)  # number of names that a case or its columns may have
-_REQUIRED = frozenset(name for name, about in Case.model_fields.items() if about.is_required())
 _OPENS_LIST = re.compile(rb"[ \t\r\n]*\[")
+
+
+class Reason(NamedTuple):
+    """Say why a row is not a case."""
+
+    field: str | None  #: the bad field; None if the whole case is bad
+    text: str  #: empty for an unknown name that is not listed: its advice takes long to find
 
 
 class Body(NamedTuple):
@@ -104,9 +106,8 @@ def _check_names(columns: Mapping[str, Any], words: Mapping[str, Any]) -> None:
 def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
     """Read rows one by one; a bad row gets its first reason.
 
-    Whether a row is a case is decided quickly, once for all rows with the same names.  Only for a
-    row that is bad and is listed, the model of a case finds the reason, which takes ten times as
-    long.
+    The columns for its numbers, or the reason why it is not a case, are found once for all rows
+    with the same names.  The library checks later whether the numbers are valid together.
     """
     columns: dict[str, Any] = {name: np.full(len(rows), np.nan) for name in (*ALL_FIELDS, *ENDS)}
     columns |= {name: np.zeros(len(rows)) for name in DEVIATIONS}
@@ -117,9 +118,11 @@ def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
     reasons: dict[int, Reason] = {}
     for i, row in enumerate(rows):
         look()
-        if (numbers := _numbers_in(row, targets_of)) is None:
+        numbers = _numbers_in(row, targets_of)
+        if isinstance(numbers, Reason):
             if len(reasons) < MAX_REASONS:
-                reasons[i] = _first_reason(row, words)
+                name, text = numbers
+                reasons[i] = Reason(name, text or unknown_name(name or "", Case.model_fields))
             continue
         for name, number in numbers.items():
             columns[name][i] = number
@@ -131,7 +134,7 @@ def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:
         for name in ENDS:
             columns[name][alone] = columns["k"][alone]
         for i in np.flatnonzero(columns["k"] == math.inf).tolist():
-            reasons.setdefault(i, ("k", "must be finite beside rows with an interval of k"))
+            reasons.setdefault(i, Reason("k", "must be finite beside rows with an interval of k"))
     normal = AMPLITUDE in used or usual["direction"] == DIRECTIONS[-1]
     fields = kind_of(direction=DIRECTIONS[-1]).fields if normal else FIELDS
     names = [name for name in fields if name != "k"] + [*(ENDS if {*ENDS} <= used else ("k",))]
@@ -146,70 +149,53 @@ _Targets = dict[str, tuple[str, float]]
 
 
 def _targets_of(
-    words: Mapping[str, Any], names: frozenset[str], contact: Any, direction: Any
-) -> _Targets | None:
-    """Return the columns for the numbers of a row with these names, or None if the names do not
-    form a case."""
-    if not (_REQUIRED <= names <= Case.model_fields.keys()) or names & words.keys():
-        return None
-    numbers = names - {*KIND}
-    case = {name: 0.5 if name == AMPLITUDE else 1.0 for name in numbers} | {**words}
+    words: Mapping[str, Any], names: tuple[str, ...], contact: str | None, direction: str | None
+) -> _Targets | Reason:
+    """Return the columns for the numbers of a row with these names, or the reason why the names do
+    not form a case."""
+    known = Case.model_fields
+    for name in names:
+        if name not in known:
+            shown = name[:80].encode("utf-8", "replace").decode()  # half of a surrogate pair
+            return Reason(shown, "")
+    for name, about in known.items():
+        if about.is_required() and name not in names:
+            return Reason(name, "is required")
+    numbers = [name for name in known if name in names and name not in KIND]
+    case: dict[str, Any] = {name: 0.5 if name == AMPLITUDE else 1.0 for name in numbers}
     case |= {name: x for name, x in zip(KIND, (contact, direction), strict=True) if x is not None}
-    try:
-        Cases.of(named(None, case))
-    except InputError:
-        return None
     targets = {}
+    try:
+        if twice := case.keys() & words.keys():
+            raise InputError(min(twice), None, "left out: it is given in the query")
+        Cases.of(named(None, {**words, **case}))
+    except InputError as error:
+        return Reason(error.field or None, reason_of(error))
     for name in numbers:
         field, unit = field_of(DEVIATIONS.get(name, name))
         targets[name] = (f"std_{field}" if name in DEVIATIONS else field), unit
     return targets
 
 
-def _numbers_in(row: Any, targets_of: Callable[..., _Targets | None]) -> dict[str, float] | None:
-    """Return the numbers of a row by column, or None if the row is not a case."""
+def _numbers_in(
+    row: Any, targets_of: Callable[..., _Targets | Reason]
+) -> dict[str, float] | Reason:
+    """Return the numbers of a row by column, or the first fault of its names and numbers."""
     if not isinstance(row, dict):
-        return None
+        return Reason(None, "must be an object")
     if None in row.values():  # a null means left out, except in k, where it may mean rigid
         row = {name: x for name, x in row.items() if x is not None or name == "k"}
-    try:
-        targets = targets_of(frozenset(row), row.get("contact"), row.get("direction"))
-    except TypeError:  # a list is not a word
-        return None
-    if targets is None:
-        return None
+    kind = (x if x is None or isinstance(x, str) else "" for x in map(row.get, KIND))
+    targets = targets_of(tuple(row), *kind)
+    if isinstance(targets, Reason):
+        return targets
     numbers = {}
     for name, (column, unit) in targets.items():
         number, reason = entry(name, row[name])
         if reason is not None:
-            return None
+            return Reason(name, reason)
         numbers[column] = unit * number
-    if "k_low" in numbers and numbers["k_low"] > numbers["k_high"]:
-        return None
-    if AMPLITUDE in numbers and numbers[AMPLITUDE] >= numbers["Fz"]:
-        return None
     return numbers
-
-
-def _first_reason(row: Any, words: Mapping[str, Any]) -> Reason:
-    """Return the first fault of a row that is not a case, in the order of the inputs."""
-    if not isinstance(row, dict):
-        return None, "must be an object"
-    if unknown := next((name for name in row if name not in Case.model_fields), None):
-        shown = unknown[:80].encode("utf-8", "replace").decode()  # half of a surrogate pair
-        return shown, unknown_name(unknown, Case.model_fields)
-    try:
-        values = Case.model_validate(row).values
-        if twice := values.keys() & words.keys():
-            raise InputError(min(twice), None, "left out: it is given in the query")
-        Cases.of(named(None, {**words, **values}))
-    except InputError as error:
-        return str(error.field) or None, reason_of(error)
-    except ValidationError as error:
-        faults = faults_of(error.errors(include_url=False), Case.model_fields)
-        first = min(faults, key=lambda fault: [*Case.model_fields].index(str(fault.path[0])))
-        return str(first.path[0]), first.reason
-    raise AssertionError(f"the row {row} is a case")
 
 
 # --- answers --------------------------------------------------------------------------------------

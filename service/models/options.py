@@ -3,7 +3,7 @@
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import BeforeValidator, ConfigDict, Field
 
 from mumacro.inputs.cases import DEVIATIONS, KIND
 from mumacro.inputs.fields import ContactName, DirectionName, Kind, kind_of
@@ -14,7 +14,6 @@ from ..understood import UNDERSTOOD
 from .inputs import (
     ALTERNATIVES,
     EXAMPLE,
-    INPUTS,
     CaseInputs,
     ContactColumn,
     DeviationColumn,
@@ -22,11 +21,9 @@ from .inputs import (
     InputColumns,
     Strict,
     either,
-    is_rigid,
-    not_a_number,
     optional,
 )
-from .values import OR_ONE, Deviation, Positive, fault
+from .values import OR_ONE, Deviation, Positive
 
 MODEL = "model"  # only for one case
 _BESIDE = (MODEL, UNDERSTOOD)  # options that the library does not compute
@@ -157,21 +154,6 @@ class Case(Deviations, CaseInputs):
 
     contact: ContactName | None = optional(_CONTACT)
     direction: DirectionName | None = optional(_DIRECTION)
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """Return all members that the library takes."""
-        words = {"contact": self.contact, "direction": self.direction}
-        members = {name: word for name, word in words.items() if word is not None}
-        return self.inputs | members | self.deviations
-
-    @field_validator(*INPUTS, *DEVIATIONS, mode="before")
-    @classmethod
-    def _no_text(cls, value: Any, info: ValidationInfo) -> Any:
-        name = info.field_name or ""
-        if isinstance(value, str) and not (name == "k" and is_rigid(value)):
-            raise fault(not_a_number(name, value))
-        return value
 
 
 class CaseColumns(DeviationColumns, Outputs, Choice, InputColumns):

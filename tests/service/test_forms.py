@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service import forms
+from mumacro.inputs.cases import KIND
+from service import forms, json_text
 from service.problems import RequestError
 from tests.support.serving import CASE
 
@@ -38,10 +39,11 @@ def plain(value: Any) -> Any:
     return value
 
 
-def outcome(text: str, fast: bool = True) -> Any:
-    """What is read of a body, by the fast readers where they can, or never by them; None where it
-    is refused."""
+def outcome(text: str, fast: bool = True, piece: int = 20) -> Any:
+    """What is read of a body, by the fast readers where they can, in pieces of so many bytes, or
+    never by them; None where it is refused."""
     with ExitStack() as stack:
+        stack.enter_context(patch.object(json_text, "_PIECE", piece))
         if not fast:
             for name in ("decode_columns", "decode_rows"):
                 stack.enter_context(patch.object(forms, name, side_effect=ValueError))
@@ -61,10 +63,18 @@ def test_columns_are_read_as_json_reads_them(
     assert outcome(text, fast) == expected
 
 
-@given(ROWS, SPACES, st.booleans())
-def test_rows_are_read_as_json_reads_them(rows: list[Any], spaces: Any, fast: bool) -> None:
+@given(ROWS, SPACES, st.booleans(), st.integers(0, 1000))
+def test_rows_are_read_as_json_reads_them(
+    rows: list[Any], spaces: Any, fast: bool, piece: int
+) -> None:
     expected = {name: [float(row[name]) for row in rows] for name in CASE}
-    assert outcome(json.dumps(rows, separators=spaces), fast) == expected
+    assert outcome(json.dumps(rows, separators=spaces), fast, piece) == expected
+
+
+@pytest.mark.parametrize("row", [{"k": 1.0, "contact": "spring"}, dict.fromkeys(KIND, "along")])
+def test_rows_that_are_mostly_words_get_a_reason(row: dict[str, Any]) -> None:
+    body = forms.read(bytearray(json.dumps([row] * 2).encode()), 10, {})
+    assert body.reasons[0] == body.reasons[1] == ("mu0", "is required")
 
 
 @given(ROWS, st.sampled_from([*CASE]), st.one_of(st.booleans(), VALUES))
