@@ -1,8 +1,8 @@
-"""Friction of a contact that oscillates across its sliding direction: a surrogate of the full
-stick-slip model.
+"""Compute the friction of a contact that oscillates across its sliding direction, with a surrogate
+of the full stick-slip model.
 
-A name is imported when it is first used (PEP 562), so that a program loads what it needs and no
-more.  To add one: a line under ``TYPE_CHECKING``, which type checkers and editors read, one in
+A name is imported when it is first used (PEP 562), so that a program loads only what it needs.  To
+add a name, add a line under ``TYPE_CHECKING``, which type checkers and editors read, one in
 ``_PLACES``, and one in ``__all__``.
 """
 
@@ -88,18 +88,19 @@ __all__ = [
 ]
 
 if _sys.argv[:1] == ["-m"]:
-    # "python -m mumacro", "-m builder" and "-m service" report in one line what is missing
+    # "python -m mumacro", "-m builder" and "-m service" report a missing package in one line
     try:
         _import_module("mumacro.surrogate")
     except ImportError as _error:
         raise SystemExit(_missing("", _error)) from None
 
-if not _TYPE_CHECKING:  # with it a type checker would accept any name
+if not _TYPE_CHECKING:  # a type checker would otherwise accept any name
 
     def __getattr__(name: str) -> object:
-        """Import a public name, which the module then holds.
+        """Import a public name and keep it in the module.
 
-        AttributeError for any other; for a method of a surrogate it says how to call it.
+        Raise AttributeError for any other name; for a method of a surrogate the message says how to
+        call it.
         """
         if name in _PLACES:
             module = _import_module(f"mumacro.{_PLACES[name]}")
@@ -121,5 +122,5 @@ if not _TYPE_CHECKING:  # with it a type checker would accept any name
 
 
 def __dir__() -> list[str]:
-    """The public names; folders and modules behind them are left out."""
+    """Return the public names, without the folders and modules that hold them."""
     return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

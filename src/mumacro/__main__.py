@@ -1,4 +1,4 @@
-"""``python -m mumacro`` is the command ``mumacro``."""
+"""Run the command ``mumacro`` as ``python -m mumacro``."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""The result of the surrogate for one case or many."""
+"""Hold the result of the surrogate for one case or many."""
 
 import math
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from mumacro.notes import Note
 from mumacro.results import Result, Rows, cell
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
-#: float for one case; for many an array of float64
+#: a float for one case, an array of float64 for many
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
 
@@ -24,11 +24,11 @@ else:
 
     Number = TypeVar("Number")
 
-# by source code; the last entry is that of -1, an illegal case
+# by source code; the last entry is for -1, an illegal case
 _SOURCE_NAMES = np.array([*SOURCES, ""], dtype=object)
-BAND = ("mu_macro_low", "mu_macro_high")  # of an interval of k
+BAND = ("mu_macro_low", "mu_macro_high")  # for an interval of k
 GROUPS = ("v_tilde", "y_tilde", "length_scale")
-#: the paths of the answer when nothing else is asked for
+#: the paths of the default answer
 DEFAULT = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
 TEXTS = ("regime", "source")
 _REGIME_CODES = np.append(REGIME_OF_SOURCE, np.int8(-1))
@@ -36,11 +36,11 @@ _REGIME_NAMES = np.array([*REGIMES, ""], dtype=object)[_REGIME_CODES]
 
 
 class Answer(Result, Generic[Number]):
-    """Macroscopic friction with its bound; floats and strings for a scalar call, arrays of the
-    broadcast shape else.
+    """Hold macroscopic friction with its bound: floats and texts for one case, otherwise arrays of
+    the broadcast shape.
 
-    ``answer["power.saved"]`` is an output by the path that it has in the JSON of one case: the
-    default ones, and those that ``include`` has asked for.
+    ``answer["power.saved"]`` is an output by the path that it has in the JSON of one case: an
+    output of the default answer, or one that ``include`` asked for.
 
     Attributes
     ----------
@@ -54,16 +54,16 @@ class Answer(Result, Generic[Number]):
         Block or closed form that gave the value, index into :data:`mumacro.SOURCES`; -1 for an
         illegal case.
     gradient : dict of str to float or ndarray, or None
-        d mu_macro / d input by field name, where requested; infinite for v0 at v0 = 0 on y~ = 1,
-        0 for k where the contact is rigid.
+        d mu_macro / d input by field name, if requested; infinite for v0 at v0 = 0 on y~ = 1, 0 for
+        k if the contact is rigid.
     gradient_bound : dict of str to float or ndarray, or None
         Verified bounds of the absolute errors of ``gradient``.
     mu_macro_low, mu_macro_high : float or ndarray
-        Of an interval of k alone: smallest and largest mu_macro over it [-]; all else is that of
-        its geometric middle, and ``error_bound`` holds for them, too.
+        Only for an interval of k: smallest and largest mu_macro over it [-].  All other values are
+        for its geometric middle; ``error_bound`` holds for these two as well.
     outputs : dict of str to float or ndarray
-        What ``include`` has asked for, by path [SI]; NaN at an illegal case of an array, and where
-        there is no such number.
+        The outputs that ``include`` asked for, by path [SI]; NaN at an illegal case of an array,
+        and where the output does not exist.
 
     Examples
     --------
@@ -112,7 +112,8 @@ class Answer(Result, Generic[Number]):
         self.source_code = source_code
         self._groups = groups
         self._cases: Cases | None = cases
-        #: in place of cases, of one case in plain numbers: its kind, the six, whether f was given
+        #: for one case as plain numbers, instead of cases: contact and direction, the six inputs,
+        #: whether f was given
         self._plain: tuple[Kind, tuple[float, ...], bool]
         self._surrogate = surrogate
         self.gradient = self.gradient_bound = None
@@ -123,10 +124,10 @@ class Answer(Result, Generic[Number]):
     # --- by name ----------------------------------------------------------------------------------
 
     def __getattr__(self, name: str) -> Any:
-        """Raise AttributeError, with the way to ask for an output of this name."""
+        """Raise AttributeError that says how to ask for an output of this name."""
         if name in BAND:
             raise AttributeError(f"{name} is there for an interval of k: evaluate(k_low=, k_high=)")
-        if hasattr(type(self), name):  # a property that has no value says why itself
+        if hasattr(type(self), name):  # a property without a value gives its own reason
             return object.__getattribute__(self, name)
         if name.startswith("_"):
             raise AttributeError(f"{type(self).__name__} has no {name}")
@@ -143,47 +144,48 @@ class Answer(Result, Generic[Number]):
 
     @property
     def v_tilde(self) -> Number:
-        """Dimensionless speed v0 k/(mu0 Fz omega) [-]; of arrays only where groups or the gradient
-        were requested."""
+        """Return the dimensionless speed v0 k/(mu0 Fz omega) [-]; for arrays only if groups or the
+        gradient were requested."""
         return self._group(0)
 
     @property
     def y_tilde(self) -> Number:
-        """Dimensionless amplitude y0 k/(mu0 Fz), for direction normal Fz_amplitude/Fz [-]; as
-        v_tilde."""
+        """Return the dimensionless amplitude y0 k/(mu0 Fz), for direction normal Fz_amplitude/Fz
+        [-]; for arrays as v_tilde."""
         return self._group(1)
 
     @property
     def length_scale(self) -> Number:
-        """l0 = mu0 Fz / k [m], eq. (5); 0 for rigid contact; as v_tilde."""
+        """Return l0 = mu0 Fz / k [m], eq. (5); 0 for a rigid contact; for arrays as v_tilde."""
         return self._group(2)
 
     @property
     def regime_code(self) -> Any:
-        """Index into :data:`mumacro.REGIMES`: int, or ndarray of int8; -1 for an illegal case."""
+        """Return the index into :data:`mumacro.REGIMES`: int, or ndarray of int8; -1 for an illegal
+        case."""
         codes: Any = _REGIME_CODES[self.source_code]
         return int(codes) if isinstance(self.source_code, int) else codes
 
     @property
     def regime(self) -> Any:
-        """One of :data:`mumacro.REGIMES`: str, or ndarray of shared str.
+        """Return one of :data:`mumacro.REGIMES`: str, or ndarray of shared str.
 
-        ``"continuous"``, ``"stick_slip"``, ``"static"`` (v0 = 0); ``"partial_slip"`` where some
-        springs of a ball slide continuously and others do not; ``"reverse_slip"`` where an
-        oscillation along slides backwards, too.
+        ``"continuous"``, ``"stick_slip"``, ``"static"`` (v0 = 0); ``"partial_slip"`` if some
+        springs of a ball slide continuously and others do not; ``"reverse_slip"`` if an oscillation
+        along also slides backwards.
         """
         return _REGIME_NAMES[self.source_code]
 
     @property
     def source(self) -> Any:
-        """Name of the block or closed form that gave the value: str, or ndarray of shared str, made
-        on request."""
+        """Return the name of the block or closed form that gave the value: str, or ndarray of
+        shared str.  It is made on request."""
         return _SOURCE_NAMES[self.source_code]
 
     @property
     def regime_certain(self) -> Any:
-        """Whether the regime is the same for every v~crit within its bound: bool or ndarray of
-        bool; as v_tilde."""
+        """Return whether the regime is the same for every v~crit within its bound: bool or ndarray
+        of bool; for arrays as v_tilde."""
         if self._groups is None:
             raise AttributeError('regime_certain needs the groups: evaluate(..., include="groups")')
         certain = self._surrogate.tabulated.certain(*self._groups[:2], self.cases.kind)
@@ -191,16 +193,17 @@ class Answer(Result, Generic[Number]):
 
     @property
     def _always(self) -> tuple[str, ...]:
-        """The paths of what is there without being asked for."""
+        """Return the paths of the default answer."""
         return (*DEFAULT, *(name for name in BAND if hasattr(self, name)))
 
     @property
     def paths(self) -> list[str]:
-        """The paths of all outputs, in the order of the JSON of one case."""
+        """Return the paths of all outputs, in the order of the JSON of one case."""
         return [*self._always, *self.outputs]
 
     def __getitem__(self, path: str) -> Any:
-        """An output by its path; KeyError with the remedy for one that was not asked for."""
+        """Return an output by its path.  Raise KeyError with the remedy for an output that was not
+        asked for."""
         if path in self.outputs:
             return self.outputs[path]
         if path in self._always:
@@ -218,7 +221,7 @@ class Answer(Result, Generic[Number]):
 
     @property
     def cases(self) -> Cases:
-        """The cases that were evaluated."""
+        """Return the cases that were evaluated."""
         if self._cases is None:
             kind, six, with_f = self._plain
             columns: dict[str, Any] = dict(zip(kind.fields, map(float, six), strict=True))
@@ -227,13 +230,13 @@ class Answer(Result, Generic[Number]):
 
     @property
     def notes(self) -> list[Note]:
-        """The remarks on the cases, and on outputs that are missing or doubtful;
-        ``mumacro.validity.notes_of`` has what the model leaves out in one case, too."""
+        """Return the remarks on the cases, and on outputs that are missing or doubtful.  For one
+        case, ``mumacro.validity.notes_of`` also has what the model leaves out."""
         return self.notes_in({})
 
     def notes_in(self, units: Mapping[str, str]) -> list[Note]:
-        """Return :attr:`notes`, with a value in the unit that ``units`` has for its input, as it
-        was typed."""
+        """Return :attr:`notes` with values in the units that were typed; ``units`` has the unit of
+        each input."""
         cases = self.cases
         on_inputs = doubts(cases.columns, cases.f is not None, {**cases.units, **units})
         return [*on_inputs, *self.notes_on_outputs]
@@ -241,12 +244,12 @@ class Answer(Result, Generic[Number]):
     # --- other forms ------------------------------------------------------------------------------
 
     def plot(self, ax: Any = None) -> Any:
-        """Return the cases on the map of mu~ of their contact and direction, by regime, with the
-        border of continuous sliding; needs matplotlib.
+        """Draw the cases on the map of mu~ of their contact and direction, by regime, with the
+        border of continuous sliding.  Matplotlib is needed.
 
-        A rigid contact, and whatever else lies beyond the map, stands at its edge with a word that
-        says why; an interval of k is a line through its middle.  ``ax`` are axes of matplotlib, or
-        new ones, and are returned.
+        A rigid contact, or any other case outside the map, is drawn at its edge with a word that
+        says why.  An interval of k is a line through its middle.  ``ax`` are matplotlib axes, or
+        None for new ones.  They are returned.
         """
         kind = self.cases.kind
         title = ", ".join(kind.names.values()) if self.cases.shape else self._title()
@@ -285,8 +288,8 @@ class Answer(Result, Generic[Number]):
 
     @property
     def columns(self) -> dict[str, Any]:
-        """The outputs by path, in the shape of the cases; of a frame one row a case, in the order
-        of ``ravel``.
+        """Return the outputs by path, in the shape of the cases; for a frame one row for each case,
+        in the order of ``ravel``.
 
         >>> from mumacro import Surrogate
         >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=20e3)
@@ -297,7 +300,7 @@ class Answer(Result, Generic[Number]):
         return {path: self[path] for path in self.paths}
 
     def _members(self) -> dict[str, Any]:
-        """Return what is in the JSON of one case: ``power.saved`` is ``saved`` within ``power``.
+        """Return the JSON of one case: ``power.saved`` is ``saved`` within ``power``.
 
         >>> from mumacro import Surrogate
         >>> case = dict(mu0=0.3, Fz=10.0, k=1e6, y0=2e-6, f=20e3, v0=0.01)
@@ -329,7 +332,7 @@ class Answer(Result, Generic[Number]):
         return [(path, cell(x)) for path, x in self.columns.items()] if self._is_one() else None
 
     def _in_full(self) -> tuple[str, Rows | None, list[str]]:
-        """Return what the command prints of one case."""
+        """Return what the command prints for one case."""
         if not self._is_one():
             return super()._in_full()
         rows, notes, error = self._surrogate.in_words(self)
@@ -340,14 +343,14 @@ _NOTHING: dict[str, Any] = {}
 
 
 def _ray(columns: Mapping[str, Any], amplitude: str, size: int) -> Any:
-    """Return y0 omega / v0, (size,): y~/v~ of a rigid contact, too."""
+    """Return y0 omega / v0, (size,), which is y~/v~, also for a rigid contact."""
     with np.errstate(all="ignore"):
         ratio = columns[amplitude] * np.asarray(columns["omega"]) / columns["v0"]
     return np.broadcast_to(ratio, size)
 
 
 def _edge_words(columns: Mapping[str, Any], amplitude: str, v: Any, y: Any) -> Any:
-    """Return why cases (n,) stand at the edge of the map; empty for those on it."""
+    """Return why cases (n,) are at the edge of the map; empty texts for cases on the map."""
     with np.errstate(invalid="ignore"):
         at_v, at_y = plotting.on_map(v, y, np.ones_like(v), amplitude == AMPLITUDE)
         beyond = (at_v != v) | (at_y != y)
@@ -365,20 +368,20 @@ def _edge_words(columns: Mapping[str, Any], amplitude: str, v: Any, y: Any) -> A
 if TYPE_CHECKING:
 
     class AnswerWithGradient(Answer[Number]):
-        """An answer whose slopes were asked for, as a type checker sees it."""
+        """Show a type checker an answer that has derivatives."""
 
         gradient: dict[str, Number]
         gradient_bound: dict[str, Number]
 
     class IntervalAnswer(AnswerWithGradient[Number]):
-        """An answer over an interval of k, as a type checker sees it."""
+        """Show a type checker an answer over an interval of k."""
 
         mu_macro_low: Number
         mu_macro_high: Number
 
 
 def nested(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values by path as JSON has them.
+    """Return values by path in the nested form of JSON.
 
     >>> nested({"mu_macro": 0.2, "power.saved": 1.0, "power.oscillation": 2.0})
     {'mu_macro': 0.2, 'power': {'saved': 1.0, 'oscillation': 2.0}}

@@ -1,5 +1,5 @@
-"""The exceptions of the project, independent of HTTP; and what to install where a package is
-missing."""
+"""Define the exceptions of the project, independent of HTTP, and say what to install if a package
+is missing."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,15 +10,15 @@ _OURS = ("mumacro", "builder", "service")
 
 
 class MumacroError(Exception):
-    """Root of every error that this project raises on purpose."""
+    """Report any error that this project raises on purpose; every such error is a subclass."""
 
 
 class InputError(MumacroError, ValueError):
-    """One input value is outside the range of the model."""
+    """Report an input value that is outside the range of the model."""
 
     def __init__(self, field: str, value: object, bound: str, index: int | None = None) -> None:
         self.field = field  #: name of the input, e.g. ``"mu0"``
-        self.value = value  #: as it came in
+        self.value = value  #: value as the caller gave it
         self.bound = bound  #: what the value must satisfy, e.g. ``"finite and > 0"``
         self.index = index  #: position in the flattened, broadcast input; None for a scalar call
         where = "" if index is None else f" at index {index}"
@@ -27,19 +27,20 @@ class InputError(MumacroError, ValueError):
         super().__init__(f"{field}{where} must be {bound}{value_shown}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Rebuild from the parts: an error that a worker process raises must reach the calling
-        process."""
+        """Rebuild the error from its parts, because an error in a worker process must reach the
+        calling process."""
         return type(self), (self.field, self.value, self.bound, self.index)
 
 
 class TextError(MumacroError, ValueError):
-    """A table as text cannot be read: one line that says what, where, and the remedy."""
+    """Report a table as text that cannot be read, in one line with the fault, its place and the
+    remedy."""
 
-    faults: Sequence[str] = ()  #: one for each line, where there are several
+    faults: Sequence[str] = ()  #: one for each line, if there are several
 
     @classmethod
     def of(cls, faults: Sequence[str]) -> "TextError":
-        """Return an error that tells the first faults."""
+        """Return an error that names the first faults."""
         rest = f"; and {len(faults) - _FAULTS_SHOWN:,} more" if len(faults) > _FAULTS_SHOWN else ""
         error = cls("; ".join(faults[:_FAULTS_SHOWN]) + rest)
         error.faults = faults
@@ -47,7 +48,7 @@ class TextError(MumacroError, ValueError):
 
 
 class TableError(MumacroError):
-    """A table file cannot be used."""
+    """Report a table file that cannot be used."""
 
     def __init__(self, path: str | Path, reason: str) -> None:
         self.path = Path(path)  #: the file
@@ -56,7 +57,7 @@ class TableError(MumacroError):
         super().__init__(f"{self.path}: {reason}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Rebuild from the parts."""
+        """Rebuild the error from its parts."""
         return type(self), (self.path, self.reason)
 
 
@@ -67,17 +68,17 @@ def _shown(value: object) -> str:
 
 
 def missing(extra: str, error: ImportError) -> str:
-    """Return what to install, in one line, where an import raised ``error``; ``extra`` is empty for
+    """Return in one line what to install after an import raised ``error``; ``extra`` is empty for
     the library itself.
 
-    Raises ``error`` itself when one of the project's own modules is missing: a fault that must not
-    be hidden.
+    Raise ``error`` itself if one of the project's own modules is missing, because this fault must
+    not be hidden.
 
     >>> missing("files", ModuleNotFoundError("No module named 'pyarrow'", name="pyarrow"))
     'pyarrow is not installed: pip install "mumacro[files]" (in a checkout: pip install -e
     ".[files]")'
     """
-    if error.name is None:  # a sentence of our own: the compiled kernel is missing
+    if error.name is None:  # our own error with its own sentence: the compiled kernel is missing
         return str(error)
     package = error.name.partition(".")[0]
     if package in _OURS:

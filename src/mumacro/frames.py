@@ -1,7 +1,8 @@
-"""Frames and labels are kept: what comes in as pandas, Polars, Arrow, xarray or Dask goes out so.
+"""Keep frames and labels: inputs from pandas, Polars, Arrow, xarray or Dask give outputs of the
+same library.
 
-The outputs have the names that they have everywhere, their paths.  The labelled inputs of one call
-come from one of these libraries, with plain numbers and NumPy arrays beside them.
+The outputs have their usual names, their paths.  All labelled inputs of one call come from one of
+these libraries; plain numbers and NumPy arrays may be mixed with them.
 """
 
 import json
@@ -22,7 +23,7 @@ from mumacro.outputs import MEMBERS
 from mumacro.outputs.evaluation import chosen
 from mumacro.table.atlas import REGIMES, SOURCES
 
-#: libraries whose frames and tables give one of the same kind
+#: libraries whose frames and tables give a result of the same type
 FRAMES = ("pandas", "polars", "pyarrow", "xarray", "dask")
 # outputs that are texts -> their unit and long name, as xarray and CF write them
 _ABOUT_TEXTS = {
@@ -32,8 +33,9 @@ _ABOUT_TEXTS = {
 
 
 def frame_of_cases(cases: Any) -> str:
-    """Return the library whose frame, table or Dataset the cases are; a stream of Arrow, or an
-    object with its interface, is a table; empty for anything else, such as one row of a frame.
+    """Return the library of the frame, table or Dataset of cases.  A stream of Arrow, or an object
+    with its interface, is a table.  Return an empty text for anything else, such as one row of a
+    frame.
 
     >>> frame_of_cases({"mu0": 0.3})
     ''
@@ -50,14 +52,15 @@ def evaluate_labelled(
     surrogate: Any, cases: Any, values: Mapping[str, Any], include: Sequence[str], strict: bool
 ) -> Any:
     """Return the answer of :meth:`mumacro.Surrogate.evaluate` for a frame of cases, or for labelled
-    inputs: ``values`` are those of ``cases`` and of the keywords, by name.
+    inputs.  ``values`` has the inputs of ``cases`` and of the keywords, by name.
 
-    Objects of pandas give a DataFrame with their index (regime and source as categories), those of
-    xarray a Dataset with ``units`` and ``long_name``, arrays of Dask a dict, a frame of Dask or
-    Polars and a table of Arrow one of the same kind; with a column for each output by its path.
+    Objects of pandas give a DataFrame with their index (regime and source as categories).  Objects
+    of xarray give a Dataset with ``units`` and ``long_name``, arrays of Dask a dict.  A frame of
+    Dask or Polars and a table of Arrow give a result of the same type.  There is a column for each
+    output, named by its path.
 
-    Raise InputError for indexes that differ, objects of two libraries in one call, and for what
-    ``evaluate`` refuses.
+    Raise InputError if indexes differ, if objects of two libraries are in one call, and for
+    everything that ``evaluate`` refuses.
     """
     frame = frame_of_cases(cases) if cases is not None else ""
     libraries = {*map(library_of, values.values()), frame} - {""}
@@ -67,7 +70,8 @@ def evaluate_labelled(
     if frame == "dask":
         return _of_parts(surrogate.on_one_thread(), cases, values, include, strict)
     if libraries & {"xarray", "dask"}:
-        return _of_chunks(surrogate.on_one_thread(), values, include, strict)  # Dask has threads
+        # Dask has its own threads
+        return _of_chunks(surrogate.on_one_thread(), values, include, strict)
     index = _common_index(cases if frame == "pandas" else None, values)
     of_cases = Cases.of(values, strict=strict)
     answer = surrogate.answer(of_cases, chosen(include, of_cases))
@@ -84,7 +88,7 @@ def evaluate_labelled(
 
 
 def _common_index(frame: Any, values: Mapping[str, Any]) -> Any:
-    """Return the index of all Series; InputError for one that is indexed otherwise."""
+    """Return the index of all Series.  Raise InputError for a Series with another index."""
     series = {name: x for name, x in values.items() if library_of(x) == "pandas"}
     for name, one in series.items():
         if not hasattr(one, "index"):
@@ -97,7 +101,7 @@ def _common_index(frame: Any, values: Mapping[str, Any]) -> Any:
 
 
 def _codes(answer: Answer[Any], path: str) -> tuple[Any, tuple[str, ...]]:
-    """Return a text output as codes, -1 where a case is illegal, and the texts."""
+    """Return a text output as codes (-1 for an illegal case), and the texts."""
     if path == "source":
         return np.ravel(answer.source_code), tuple(SOURCES)
     return np.ravel(answer.regime_code), tuple(REGIMES)
@@ -122,7 +126,7 @@ def _as_pandas(answer: Answer[Any], index: Any) -> Any:
 
 
 def _as_polars(answer: Answer[Any]) -> Any:
-    """Return a DataFrame; it has no place for remarks, which are warnings."""
+    """Return a DataFrame.  It has no place for remarks, so they become warnings."""
     import polars as pl
 
     columns = []
@@ -134,12 +138,13 @@ def _as_polars(answer: Answer[Any]) -> Any:
         else:
             columns.append(pl.Series(path, np.ravel(answer[path])))
     for line in (note.line for note in answer.notes):
-        warnings.warn(line, UserWarning, stacklevel=4)  # of whoever called evaluate
+        # the warning shows the line that called evaluate
+        warnings.warn(line, UserWarning, stacklevel=4)
     return pl.DataFrame(columns)
 
 
 def _as_arrow(answer: Answer[Any], cases: Any) -> Any:
-    """Return a table, or a batch for a batch, with the remarks as JSON in its metadata."""
+    """Return a table (for a batch: a batch) with the remarks as JSON in its metadata."""
     import pyarrow as pa
 
     columns: dict[str, Any] = {}
@@ -147,7 +152,7 @@ def _as_arrow(answer: Answer[Any], cases: Any) -> Any:
         if path in TEXTS:
             codes, texts = _codes(answer, path)
             indices = pa.array(codes, pa.int8(), mask=codes < 0)
-            # NumPy takes a null of a dictionary for its last word
+            # NumPy would take a null of a dictionary for its last word
             words = pa.DictionaryArray.from_arrays(indices, pa.array(texts))
             columns[path] = words.dictionary_decode()
         else:
@@ -160,8 +165,8 @@ def _as_arrow(answer: Answer[Any], cases: Any) -> Any:
 def _of_parts(
     surrogate: Any, cases: Any, values: Mapping[str, Any], include: Sequence[str], strict: bool
 ) -> Any:
-    """Return a DataFrame of Dask, part by part; one without rows is evaluated now, so that faults
-    of its columns show."""
+    """Return a DataFrame of Dask, evaluated part by part.  A frame without rows is evaluated now,
+    so that faults of its columns are reported now."""
     import pandas as pd
 
     options = {"include": include, "illegal": "raise" if strict else "nan"}
@@ -177,7 +182,7 @@ def _of_parts(
 def _of_chunks(
     surrogate: Any, values: Mapping[str, Any], include: Sequence[str], strict: bool
 ) -> Any:
-    """Return a Dataset, or a dict of arrays of Dask, chunk by chunk."""
+    """Return a Dataset, or a dict of arrays of Dask, evaluated chunk by chunk."""
     arrays, constants = dict[str, Any](), dict[str, Any]()
     for name, x in values.items():
         if hasattr(x, "to_dask_array"):
@@ -208,7 +213,7 @@ def _of_chunks(
 def _outputs(
     surrogate: Any, cases: Cases, include: Sequence[str], notes: list[Note] | None = None
 ) -> dict[str, Any]:
-    """Return all outputs of cases by path; what is said of them is added to ``notes``."""
+    """Return all outputs of cases by path, and add their notes to ``notes``."""
     answer = surrogate.answer(cases, chosen(include, cases))
     if notes is not None:
         for note in answer.notes:
@@ -222,7 +227,7 @@ def _as_xarray(
     types: Mapping[str, Any],
     notes: list[Note],
 ) -> Any:
-    """Return a Dataset; what Dask has not computed yet has no remarks."""
+    """Return a Dataset.  Values that Dask has not computed yet have no remarks."""
     import xarray as xr
 
     options: dict[str, Any] = {
@@ -238,7 +243,7 @@ def _as_xarray(
         array.attrs = {"units": unit.replace("-", "1"), "long_name": meaning}
     if notes and dataset["mu_macro"].chunks is None:
         lines = (f"{one.field} ({one.cases} cases): {one.text}" for one in notes)
-        dataset.attrs["remarks"] = "\n".join(lines)  # as text, which netCDF can hold
+        dataset.attrs["remarks"] = "\n".join(lines)  # as a text, because netCDF can hold it
     return dataset
 
 
@@ -256,8 +261,8 @@ def _as_dask(
 
 
 def _call_aligned(call: Callable[[], Any], inputs: Mapping[str, Any]) -> Any:
-    """Return all results of ``call``; InputError where the labels or shapes of its arguments do not
-    fit."""
+    """Return all results of ``call``.  Raise InputError if the labels or shapes of its arguments do
+    not fit."""
     try:
         return call()
     except InputError:

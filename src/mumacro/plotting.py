@@ -1,13 +1,13 @@
-"""Pictures by matplotlib, which is loaded at the first of them.  They draw what they are given:
-arrays, names and marks.
+"""Draw pictures with matplotlib, which is loaded for the first picture.
+They draw what they get: arrays, names and marks.
 
 The methods ``plot`` of :class:`mumacro.Surrogate`, :class:`mumacro.Answer`, of a law, of solutions,
-motions and fits fill in the numbers.  Each draws on ``ax``, the axes of matplotlib that are given,
-or new ones; of a picture with two panels an array of two, or one, which gets the first panel alone.
-Each returns the axes of its first panel, whose ``figure`` is the whole picture.  MumacroError where
-matplotlib is not installed.  Sizes,
-lines, grids and the colours of curves are those of the user's style; the map has its own colours,
-which are those of the page, too, and each regime has one colour everywhere.
+motions and fits fill in the numbers.  Each draws on ``ax``: matplotlib axes of the caller, or new
+ones.  For a picture with two panels ``ax`` is an array of two axes, or one, which then shows only
+the first panel.  Each method returns the axes of its first panel, whose ``figure`` is the whole
+picture.  It raises MumacroError if matplotlib is not installed.  Sizes, lines, grids and the
+colours of curves follow the user's style.  The map has its own colours, the same as on the page,
+and each regime has one colour everywhere.
 """
 
 import importlib
@@ -27,17 +27,17 @@ from mumacro.inputs.units import format_number, suit_unit, tidy_zeros, unit_of
 from mumacro.kernel.arrays import Array
 
 ENDINGS = (".png", ".svg", ".pdf")
-#: the map: v~ from deep in creep to fast sliding [-], and y~ [-]; that of a normal force is below
-#: 1, where the contact lifts off
+#: ranges of the map: v~ from very slow drag to fast sliding [-], and y~ [-]; for a normal force y~
+#: is below 1, where the contact lifts off
 V_RANGE, Y_RANGE, NORMAL_RANGE = (1e-4, 1e3), (1e-2, 1e3), (0.0, 0.999)
-#: contours of mu~ on every map, and those with a number
+#: contours of mu~ on every map, and the ones with a number
 LEVELS = (0.01, 0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 LABELLED = (0.01, 0.03, 0.1, 0.3, 0.5, 0.7, 0.9, 0.95, 0.99)
-#: of every map, evenly over its areas between two contours; darker is slipperier, also without
-#: colour
+#: colours of every map, evenly spaced over the areas between two contours; darker means less
+#: friction, also in black and white
 COLOURS = ("#35609f", "#3a86b6", "#58aec0", "#90cfbb", "#cbe8b9", "#fff9d6")
 INK, BLUE, RED, GREY = "#16202c", "#0b5cad", "#a3242b", "#6b7683"
-#: of all borders, readable on light and on dark paper
+#: colour of all borders, readable on light and on dark paper
 BORDER = "#c8323c"
 _SYMBOLS = {
     "mu0": r"$\mu_0$",
@@ -53,7 +53,7 @@ _LINES = {"border of reverse slip": "-.", "border of continuous sliding": "--"}
 
 
 class Look(NamedTuple):
-    """How every picture shows a regime."""
+    """Define how every picture shows a regime."""
 
     words: str
     colour: str
@@ -68,27 +68,29 @@ REGIMES = {
     "reverse_slip": Look("reverse slip", "#a33a8f", "^"),
     "static": Look("at rest", "#6b7683", "v"),
 }
-_MARKS = "osD^vPX"  # of sets of measured points
-_MOST_LABELS = 8  # of curves in a legend
-_MOST_RANGES = 20  # of intervals of k on a map
-_MANY = 1000  # cases on a map, drawn as small dots
-_TO_BORDER = 0.4  # weight of a label's distance to the border beside that to another line
-_SIDE = 0.05  # of the map, where no label stands
-_ARROWS = 16  # of the force along a path
-#: places where the map names the regime, in shares of its width and height
+_MARKS = "osD^vPX"  # marks of the sets of measured points
+_MOST_LABELS = 8  # limit of the curves in a legend
+_MOST_RANGES = 20  # limit of the intervals of k on a map
+_MANY = 1000  # from this number on, cases on a map are drawn as small dots
+# weight of a label's distance to the border, relative to its distance to another line
+_TO_BORDER = 0.4
+_SIDE = 0.05  # part of the map at each side without labels
+_ARROWS = 16  # number of arrows of the force along a path
+#: places where the map names the regime, as fractions of its width and height
 AREAS = ((0.14, 0.735), (0.8, 0.12))
 
 
 class Panels(NamedTuple):
-    """How many axes a picture has, and its size [inches]; that of the user's style if left out."""
+    """Describe how many axes a picture has, and its size [inches]; the default is the size of the
+    user's style."""
 
     rows: int = 1
     columns: int = 1
     size: tuple[float, float] | None = None
-    heights: tuple[float, ...] | None = None  #: of the rows, which share their x
+    heights: tuple[float, ...] | None = None  #: heights of the rows, which share their x
 
     def on(self, figure: Any) -> Any:
-        """Return the axes of a figure, an array of them where there are several."""
+        """Return the axes of a figure, as an array if there are several."""
         return figure.subplots(
             self.rows, self.columns, sharex=self.heights is not None, height_ratios=self.heights
         )
@@ -100,27 +102,27 @@ OF_FIT = Panels(rows=2, size=(6.4, 5.6), heights=(3.0, 1.0))
 
 
 class MeasuredCurve(NamedTuple):
-    """Measured points at one set of the other inputs, and the fit there."""
+    """Hold measured points that have the same values of the other inputs, and the fit for them."""
 
-    label: str  #: the inputs in which the set differs from others
-    x: Array  #: of the points (n,)
+    label: str  #: the inputs in which these points differ from the other sets
+    x: Array  #: values of the points (n,)
     mu: Array  #: measured mu_macro [-], (n,)
-    bars: Array | None  #: standard deviations of ``mu`` [-], (n,), where known
+    bars: Array | None  #: standard deviations of ``mu`` [-], (n,), if known
     residuals: Array  #: ``mu`` minus the fit [-], (n,)
-    fine: Array  #: places of the curve (m,)
-    model: Array  #: mu_macro of the fit there [-], (m,)
+    fine: Array  #: values of the curve (m,)
+    model: Array  #: mu_macro of the fit at these values [-], (m,)
     off: Array  #: half the width of its band [-], (m,)
 
 
 class Marks(NamedTuple):
-    """Cases on a map."""
+    """Hold cases on a map."""
 
-    v: Array  #: v~ (n,); infinite where the contact is rigid
-    y: Array  #: y~ (n,), likewise
+    v: Array  #: v~ (n,); infinite if the contact is rigid
+    y: Array  #: y~ (n,); infinite if the contact is rigid
     ray: Array  #: y0 omega / v0 (n,): y~/v~, also where both are infinite
     regimes: NDArray[Any]  #: names (n,); empty for an illegal case
-    words: NDArray[Any]  #: (n,); why a case is at an edge, empty for one that is on the map
-    #: of intervals of k: the shares of the softest and the stiffest of the k that is marked, (n,)
+    words: NDArray[Any]  #: (n,); why a case is at an edge, empty for a case on the map
+    #: for intervals of k: the softest and the stiffest k, divided by the k that is marked, (n,)
     ends: tuple[Array, Array] | None = None
 
 
@@ -132,7 +134,7 @@ def _loaded(name: str) -> Any:
 
 
 def axes_for(ax: Any, panels: Panels = Panels()) -> Any:  # noqa: B008 - it cannot change
-    """Return the axes of matplotlib that were given, or new ones."""
+    """Return the matplotlib axes of the caller, or new ones."""
     if ax is not None:
         return ax
     pyplot = _loaded("pyplot")
@@ -162,13 +164,13 @@ def save(
     panels: Panels = Panels(),  # noqa: B008 - it cannot change
     dpi: int = 150,
 ) -> None:
-    """Write a picture in the style of this project; ``draw`` gets its axes, of several panels an
-    array of them.  InputError where the name does not end in one of ``ENDINGS``."""
+    """Write a picture in the style of this project; ``draw`` gets its axes (several panels: an
+    array of them).  Raise InputError if the name does not end in one of ``ENDINGS``."""
     path = Path(path)
     if path.suffix not in ENDINGS:
         endings = f"one that ends in {', '.join(ENDINGS)}, or for the command in .csv"
         raise InputError("file name", str(path), endings)
-    # the same picture is the same bytes
+    # the same picture has the same bytes
     metadata = {".svg": {"Date": None}, ".png": {"Software": None}}.get(path.suffix)
     with style():
         figure = _loaded("figure").Figure(figsize=panels.size or (7.0, 4.8), layout="constrained")
@@ -180,8 +182,8 @@ def save(
 
 
 def case_title(case: Mapping[str, Any], kind: Mapping[str, str] | None = None) -> str:
-    """Return a case as the title of a picture: the inputs [SI], numbers or (low, high), and what it
-    is.
+    """Return the title of a picture of a case: the inputs [SI], numbers or (low, high), with
+    contact and direction.
 
     >>> case_title({"mu0": 0.3, "Fz": 10.0, "k": 1e6}, {"contact": "ball", "direction": "along"})
     '$\\\\mu_0$ = 0.3, $F_z$ = 10 N, $k$ = 1 N/µm; ball, along'
@@ -191,7 +193,7 @@ def case_title(case: Mapping[str, Any], kind: Mapping[str, str] | None = None) -
 
 
 def quantity_words(name: str, value: Any) -> str:
-    """Return an input [SI], a number or (low, high), with its symbol and the unit that suits it."""
+    """Return an input [SI], a number or (low, high), with its symbol and a suitable unit."""
     ends = [value] if np.ndim(value) == 0 else [*value]
     if isinstance(value, str) or math.isinf(ends[-1]):
         return f"{_SYMBOLS[name]} rigid"
@@ -201,7 +203,7 @@ def quantity_words(name: str, value: Any) -> str:
 
 
 def _in_suited_unit(si: str, *values: float) -> str:
-    """Return numbers in an SI unit, in the one that suits the last of them."""
+    """Return numbers in an SI unit, in the unit that suits the last of them."""
     unit = suit_unit(si, values[-1])
     numbers = " to ".join(tidy_zeros(format_number(value, unit, 4)) for value in values)
     unit_text = unit.symbol.replace("um", "µm").replace("uN", "µN").removeprefix("-")
@@ -209,8 +211,8 @@ def _in_suited_unit(si: str, *values: float) -> str:
 
 
 def oscillation_words(symbol: str, unit: str, terms: Iterable[tuple[int, float, float]]) -> str:
-    """Return an oscillation from harmonics, amplitudes in an SI unit, phases in degrees; empty for
-    none.
+    """Return an oscillation in words from harmonics, amplitudes in an SI unit and phases in
+    degrees; empty if there is no harmonic.
 
     >>> oscillation_words("$x$", "m", [(1, 2e-6, 90.0), (3, 4e-7, 0.0)])
     '$x$: 2 µm at 90°, 3rd harmonic 0.4 µm'
@@ -220,7 +222,7 @@ def oscillation_words(symbol: str, unit: str, terms: Iterable[tuple[int, float, 
         last = 0 if harmonic // 10 % 10 == 1 else harmonic % 10
         ending = {1: "st", 2: "nd", 3: "rd"}.get(last, "th")
         order = "" if harmonic == 1 else f"{harmonic}{ending} harmonic "
-        # whole turns say nothing
+        # whole turns have no effect
         phase = math.remainder(degrees, 360.0)
         behind = f" at {phase:.4g}°" if abs(phase) > 1e-9 else ""
         parts.append(f"{order}{_in_suited_unit(unit, amplitude)}{behind}")
@@ -228,7 +230,7 @@ def oscillation_words(symbol: str, unit: str, terms: Iterable[tuple[int, float, 
 
 
 def regime_words(name: str) -> str:
-    """Return a regime as a picture names it."""
+    """Return the name of a regime in a picture."""
     return REGIMES[name].words
 
 
@@ -244,7 +246,7 @@ def _points(text: str, size: Any) -> float:
 
 
 def _room(ax: Any, last: Any = None) -> float:
-    """Return how wide a text above the axes may be, up to the right of the ``last`` ones
+    """Return how wide a text above the axes may be, up to the right end of the ``last`` axes
     [points]."""
     boxes = []
     for one in (ax, last or ax):
@@ -254,7 +256,7 @@ def _room(ax: Any, last: Any = None) -> float:
 
 
 def _wrapped(text: str, width: float, size: Any) -> str:
-    """Return a text in lines of at most ``width`` points, broken behind commas and semicolons."""
+    """Return a text in lines of at most ``width`` points, broken after commas and semicolons."""
     lines: list[str] = []
     for line in text.split("\n"):
         now = ""
@@ -269,8 +271,8 @@ def _wrapped(text: str, width: float, size: Any) -> str:
 
 
 def head(ax: Any, title: str, legend: bool = True, last: Any = None) -> None:
-    """Write the title of axes in as many lines as it needs, and below it their legend, which so
-    covers no curve; up to the right of the ``last`` axes."""
+    """Write the title of axes in as many lines as it needs, and below it their legend, so that it
+    covers no curve.  Both extend up to the right end of the ``last`` axes."""
     size = "medium"
     pad = 6.0
     handles, labels = ax.get_legend_handles_labels()
@@ -309,13 +311,12 @@ def plot_law(
     roots_of: Mapping[float, Iterable[float]] = MappingProxyType({}),
     title: str = "",
 ) -> Any:
-    """Return mu_macro (n,) over values ``x`` (n,) of the input ``along``, with its static limit
-    (n,).
+    """Draw mu_macro (n,) over values ``x`` (n,) of the input ``along``, with its static limit (n,).
 
-    ``band`` are the least and the most mu_macro over an interval of k, (n,) each, or with
-    ``band_of`` "std" one standard deviation below and above; ``borders`` places on ``x`` with their
-    names, such as "border of continuous sliding"; ``roots_of`` values of the input to mark, by the
-    mu_macro [-] that they give; ``title`` the other inputs.
+    ``band`` are the smallest and the largest mu_macro over an interval of k, (n,) each, or with
+    ``band_of`` "std" one standard deviation below and above.  ``borders`` are places on ``x`` with
+    their names, such as "border of continuous sliding". ``roots_of`` are values of the input to
+    mark, by the mu_macro [-] that they give.  ``title`` names the other inputs.
     """
     ax, ink = axes_for(ax), _ink()
     ax.plot(x, mu_macro, color="C0", label=r"$\mu_\mathrm{macro}$")
@@ -351,7 +352,7 @@ def plot_roots(
     ax: Any = None,
     title: str = "",
 ) -> Any:
-    """Return a mean force ``of`` a motion (n,) over values ``x`` (n,) of an input, whose axis is
+    """Draw a mean force ``of`` a motion (n,) over values ``x`` (n,) of an input, whose axis is
     ``name``, with targets and roots."""
     ax, ink = axes_for(ax), _ink()
     symbol = {"mu_macro": r"\mathrm{macro}", "mu_lateral": r"\mathrm{lateral}"}[of]
@@ -369,11 +370,11 @@ def plot_roots(
 
 
 def plot_fit(along: str, curves: Sequence[MeasuredCurve], title: str, ax: Any = None) -> Any:
-    """Return measured points, the fit and its band over the input ``along``, and below them the
+    """Draw measured points, the fit and its band over the input ``along``, and below them the
     residuals; more than 8 curves have no legend.
 
-    ``ax`` are two axes, or new ones; on one alone there are no residuals.  The upper ones are
-    returned.
+    ``ax`` is a pair of axes, or one (then no residuals are drawn), or None for new ones.  The upper
+    axes are returned.
     """
     pair = axes_for(ax, OF_FIT)
     upper, lower = pair if np.ndim(pair) else (pair, None)
@@ -409,7 +410,7 @@ def plot_fit(along: str, curves: Sequence[MeasuredCurve], title: str, ax: Any = 
 
 
 def plot_loop(x: Array, force: Array, fitted: Array, title: str, ax: Any = None) -> Any:
-    """Return a measured loop, force [N] over displacement [m], and that of the model, and below
+    """Draw a measured loop, force [N] over displacement [m], and the loop of the model, and below
     them the residuals; ``ax`` as for :func:`plot_fit`."""
     pair = axes_for(ax, OF_FIT)
     upper, lower = pair if np.ndim(pair) else (pair, None)
@@ -437,8 +438,8 @@ def _ink() -> str:
 
 
 def amplitudes(n: int, normal: bool = False) -> Array:
-    """Return ``n`` amplitudes from the foot of the map to its top [-], evenly as its axis is:
-    logarithmic, linear for a ``normal`` force."""
+    """Return ``n`` amplitudes from the bottom of the map to its top [-], evenly spaced on its axis:
+    logarithmic, or linear for a ``normal`` force."""
     return np.linspace(*NORMAL_RANGE, n) if normal else np.geomspace(*Y_RANGE, n)
 
 
@@ -448,9 +449,10 @@ def speeds(n: int) -> Array:
 
 
 def band_colours() -> list[str]:
-    """Return the colour of each area between two contours, from below the lowest of ``LEVELS`` to
-    above the highest, #rrggbb."""
-    # evenly over the areas, not over mu~: below 0.1 and above 0.9 they would be nearly one colour
+    """Return the colour of each area between two contours as #rrggbb, from below the lowest of
+    ``LEVELS`` to above the highest."""
+    # evenly spaced over the areas, not over mu~: below 0.1 and above 0.9 they would have nearly the
+    # same colour
     areas = np.linspace(0.0, 1.0, len(LEVELS) + 1)
     table = np.array([[int(one[i : i + 2], 16) for i in (1, 3, 5)] for one in COLOURS])
     even = np.linspace(0.0, 1.0, len(COLOURS))
@@ -459,9 +461,9 @@ def band_colours() -> list[str]:
 
 
 def heights(ratio: Array, level: float) -> Array:
-    """Return how high mu~ falls below a level above each speed, in shares of the map's height, (n,)
-    of ``ratio`` (m, n), whose rows are even on the map; 1 where it does not, 0 where it is below
-    everywhere."""
+    """Return the height at which mu~ falls below a level above each speed, as a fraction of the
+    map's height, (n,).  ``ratio`` (m, n) has rows that are evenly spaced on the map.  The height is
+    1 where mu~ never falls below the level, 0 where it is below everywhere."""
     below = ratio < level
     first = np.where(below.any(axis=0), below.argmax(axis=0), len(ratio))
     row = np.clip(first, 1, len(ratio) - 1)
@@ -472,12 +474,12 @@ def heights(ratio: Array, level: float) -> Array:
 
 
 def label_places(ratio: Array, border: Array) -> list[tuple[float, float, float]]:
-    """Return where the numbers of the contours stand: (level, share of the width, share of the
-    height).
+    """Return the places of the numbers of the contours: (level, fraction of the width, fraction of
+    the height).
 
-    Each where its line is farthest from the other lines, from the ``border`` (n,), a height at each
-    speed, from the names of the regimes and from the numbers that stand already; none for a line
-    that is not on the map.
+    A number is at the point of its line that is farthest from the other lines, from the ``border``
+    (n,) (a height at each speed), from the names of the regimes and from the numbers that are
+    already there.  A line that is not on the map has no number.
     """
     across = np.linspace(0.0, 1.0, ratio.shape[1])
     words = [(u + aside, w) for u, w in AREAS for aside in (-0.12, 0.0, 0.12)]  # a name is wide
@@ -493,7 +495,7 @@ def label_places(ratio: Array, border: Array) -> list[tuple[float, float, float]
         apart = np.min(
             [_distances(x, y, across, line) for i, line in lines.items() if i != level], axis=0
         )
-        # the border is drawn thicker than a line, and a number beside it is hard to read
+        # the border is thicker than a line, and a number next to it is hard to read
         apart = np.minimum(apart, _TO_BORDER * _distances(x, y, across, border))
         for u, w in [*words, *(label[1:] for label in places)]:
             apart = np.minimum(apart, 0.5 * np.hypot(x - u, y - w))
@@ -503,13 +505,13 @@ def label_places(ratio: Array, border: Array) -> list[tuple[float, float, float]
 
 
 def _distances(x: Array, y: Array, across: Array, line: Array) -> Array:
-    """Return how far points (m,) are from a line of heights (n,) at ``across`` (n,); (m,)."""
+    """Return the distances of points (m,) from a line of heights (n,) at ``across`` (n,)."""
     return np.asarray(np.hypot(x[:, None] - across, y[:, None] - line).min(axis=1))
 
 
 def bands(ax: Any, x: Array, y: Array, ratio: Array) -> tuple[Any, Any]:
-    """Return mu~ (m, n) over ``x`` (n,) and ``y`` (m,) in the colours of the map, with its
-    contours: areas and lines of matplotlib."""
+    """Draw mu~ (m, n) over ``x`` (n,) and ``y`` (m,) in the colours of the map, with its contours.
+    Return the areas and lines of matplotlib."""
     levels = [0.0, *LEVELS, 1.0]
     areas = ax.contourf(x, y, np.clip(ratio, 0.0, 1.0 - 1e-12), levels, colors=band_colours())
     return areas, ax.contour(x, y, ratio, LEVELS, colors=INK, linewidths=0.6, alpha=0.75)
@@ -526,10 +528,10 @@ def plot_map(
     areas: Sequence[str] = (),
     title: str = "",
 ) -> Any:
-    """Return mu~ (m, n) over :func:`speeds` and :func:`amplitudes`, with the border of continuous
+    """Draw mu~ (m, n) over :func:`speeds` and :func:`amplitudes`, with the border of continuous
     sliding ``v_crit`` (m,), and cases: a ``point`` (v~, y~), or ``marks``.
 
-    ``direction`` is that of the oscillation; ``areas`` are the regimes at :data:`AREAS`.
+    ``direction`` is the direction of the oscillation; ``areas`` are the regimes at :data:`AREAS`.
     """
     ax, normal = axes_for(ax), direction == "normal"
     v, y = speeds(ratio.shape[1]), amplitudes(len(ratio), normal)
@@ -557,7 +559,8 @@ def plot_map(
     elif point is not None and all(math.isfinite(x) and x > 0.0 for x in point):
         ax.plot(*point, "o", color=INK, ms=10.0, mec="white", mew=2.0, zorder=5)
     head(ax, title)
-    ax.figure.draw_without_rendering()  # labels are turned along the lines as they are then
+    # labels are turned along the lines as they are at this moment
+    ax.figure.draw_without_rendering()
     border_heights = np.interp(
         np.log(v), np.log(np.maximum(v_crit, 1e-300)), np.linspace(0.0, 1.0, len(y))
     )
@@ -588,7 +591,7 @@ _AMPLITUDES = {
 
 
 def place(u: float, w: float, normal: bool = False) -> tuple[float, float]:
-    """Return (v~, y~) at shares of the map's width and height."""
+    """Return (v~, y~) at fractions of the map's width and height."""
     v = V_RANGE[0] * (V_RANGE[1] / V_RANGE[0]) ** u
     return v, NORMAL_RANGE[1] * w if normal else Y_RANGE[0] * (Y_RANGE[1] / Y_RANGE[0]) ** w
 
@@ -596,8 +599,8 @@ def place(u: float, w: float, normal: bool = False) -> tuple[float, float]:
 def on_map(v: Array, y: Array, ray: Array, normal: bool = False) -> tuple[Array, Array]:
     """Return where cases are drawn: (v~, y~) on the map, or at its edge.
 
-    Far out mu~ depends on y~/v~ alone, so that what is beyond the map is where its ray, on which
-    this ratio is constant, leaves it; that is right for rigid contacts, too.
+    Far outside the map mu~ depends only on y~/v~.  So a case outside is drawn where its ray, on
+    which this ratio is constant, leaves the map.  This is also right for rigid contacts.
 
     >>> on_map(*np.array([[0.1, np.inf], [0.5, np.inf], [5.0, 10.0]]))
     (array([  0.1, 100. ]), array([5.e-01, 1.e+03]))
@@ -617,8 +620,8 @@ def on_map(v: Array, y: Array, ray: Array, normal: bool = False) -> tuple[Array,
 
 
 def _mark(ax: Any, marks: Marks, normal: bool, halo: Any) -> None:
-    """Mark cases by regime; those beyond the map at its edge, one of them with the word that says
-    why."""
+    """Mark cases by regime.  Cases outside the map are at its edge, and one of them has the word
+    that says why."""
     v, y = on_map(marks.v, marks.y, marks.ray, normal)
     regimes = np.asarray(marks.regimes, object)
     count = v.size
@@ -672,8 +675,8 @@ def _mark(ax: Any, marks: Marks, normal: bool, halo: Any) -> None:
 
 
 def plot_harmonics(orders: Array, amplitudes: Array, rms: float, title: str, ax: Any = None) -> Any:
-    """Return amplitudes (n,) over their harmonics (n,), and the root mean square of what they leave
-    out, in the unit of the samples."""
+    """Draw amplitudes (n,) over their harmonics (n,), and the root mean square of the rest, in the
+    unit of the samples."""
     ax = axes_for(ax)
     top = max(float(amplitudes.max(initial=0.0)), rms)
     ax.vlines(orders, 0.0, amplitudes, color="C0")
@@ -701,11 +704,11 @@ def plot_cycle(
     title: str = "",
     ax: Any = None,
 ) -> Any:
-    """Return forces of one period over time, with the limit mu0 Fz where mu0 is known, and the path
+    """Draw the forces of one period over time, with the limit mu0 Fz if mu0 is known, and the path
     of the upper point with the force at 16 moments; all (n,), in SI.
 
-    ``ax`` are two axes, or new ones; on one alone there is no path.  Those of the forces are
-    returned.
+    ``ax`` is a pair of axes, or one (then no path is drawn), or None for new ones.  The axes of the
+    forces are returned.
     """
     pair = axes_for(ax, OF_CYCLE)
     forces, path = pair if np.ndim(pair) else (pair, None)

@@ -1,8 +1,8 @@
-"""What every result is: a heading, columns by path, rows where it is about one thing, and what is
-said below them.
+"""Define what every result has: a heading, columns by path, rows if it is about one thing, and
+lines below.
 
-:class:`Result` makes its forms of them: text of at most 16 lines, a table of a notebook, a frame of
-pandas, and what JSON holds.
+:class:`Result` makes all forms from them: text of at most 16 lines, a table of a notebook, a frame
+of pandas, and JSON.
 """
 
 import html
@@ -16,55 +16,57 @@ import numpy as np
 from mumacro.errors import MumacroError
 from mumacro.notes import REMARK, WARNING, Note, Remark, texts_of
 
-Rows = list[tuple[str, ...]]  # of texts, as a table shows them
+Rows = list[tuple[str, ...]]  # texts of a table
 
-LINES, WIDTH = 16, 100  # of a ``repr``
+LINES, WIDTH = 16, 100  # limits of a ``repr``
 _ENDS = 5  # rows at the beginning and at the end of a long table
 _DIGITS = 6
 
 
 class Result:
-    """What a question gives back.
+    """Hold the answer to a question.
 
-    Each kind of result says what its columns are, and may say its members as JSON has them, a
-    heading, rows and notes; the forms are made here.
+    Each subclass tells what its columns are.  It may also have members for JSON, a heading, rows
+    and notes.  This class makes the forms.
     """
 
     __slots__ = ()
 
     @property
     def columns(self) -> Mapping[str, Any]:
-        """The result as a table: numbers and texts by path."""
+        """Return the result as a table: numbers and texts by path."""
         raise NotImplementedError
 
     if TYPE_CHECKING:
 
         @property
         def notes(self) -> Sequence[Note]:
-            """What is said beside the result."""
+            """Return the notes on the result."""
 
     else:
-        notes = ()  # no property, which a field of this name could not set
+        notes = ()  # not a property, because a field of this name could not set it
 
     @property
     def remarks(self) -> list[Remark]:
-        """What is doubtful, one remark for each input or output: ``row``, the kind of doubt;
-        ``field``; ``cases``, how many; ``text``.  Empty where nothing is."""
+        """Return what is doubtful, one remark for each input or output: ``row``, the type of
+        doubt; ``field``; ``cases``, their number; ``text``.  Return an empty list if nothing is
+        doubtful."""
         return [note.as_remark for note in self.notes if note.word == REMARK]
 
     @property
     def warnings(self) -> list[str]:
-        """The texts of the notes that warn."""
+        """Return the texts of the notes that warn."""
         return texts_of(self.notes, WARNING)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the members as JSON has them, the same on the command line and over HTTP, there
-        with ``table`` and ``api_version``: lists in place of arrays, None where a number is not
-        finite."""
+        """Return the members as JSON has them.  They are the same on the command line and over
+        HTTP, where ``table`` and ``api_version`` are added.  Arrays become lists, and a number that
+        is not finite becomes None."""
         return {name: listed(value) for name, value in self._members().items()}
 
     def to_frame(self) -> Any:
-        """Return the columns as a DataFrame of pandas; raise MumacroError without pandas."""
+        """Return the columns as a DataFrame of pandas.  Raise MumacroError if pandas is not
+        installed."""
         return frame_of(self.columns)
 
     def __repr__(self) -> str:
@@ -86,7 +88,7 @@ class Result:
     # --- what a kind of result says of itself -----------------------------------------------------
 
     def _members(self) -> Mapping[str, Any]:
-        """Return the members as JSON has them, arrays as arrays."""
+        """Return the members as JSON has them, but with arrays."""
         return self.columns
 
     def _heading(self) -> str:
@@ -98,16 +100,16 @@ class Result:
         return self.columns
 
     def _rows(self) -> Rows | None:
-        """Return rows of name, value, unit and meaning in place of columns, where the result is
-        about one thing."""
+        """Return rows of name, value, unit and meaning if the result is about one thing.  They
+        replace the columns."""
         return None
 
     def _below(self) -> list[str]:
-        """Return what is said below, in a line each."""
+        """Return the lines below the result."""
         return [note.line for note in self.notes]
 
     def _in_full(self) -> tuple[str, Rows | None, list[str]]:
-        """Return heading, rows and what is said below, where there is room for all of it."""
+        """Return heading, rows and the lines below, for a place with room for all of them."""
         return self._heading(), self._rows(), self._below()
 
 
@@ -115,8 +117,8 @@ class Result:
 
 
 def listed(value: Any) -> Any:
-    """Return numbers, texts, lists and dicts for JSON: lists in place of arrays, None where a
-    number is not finite, and for no text.
+    """Return numbers, texts, lists and dicts for JSON: lists for arrays, None for a number that is
+    not finite and for a missing text.
 
     >>> listed({"mu_macro": np.array([0.2, np.nan]), "regime": "stick_slip"})
     {'mu_macro': [0.2, None], 'regime': 'stick_slip'}
@@ -143,7 +145,8 @@ def listed(value: Any) -> Any:
 
 
 def frame_of(columns: Mapping[str, Any]) -> Any:
-    """Return columns as a DataFrame of pandas, one row a case; MumacroError without pandas."""
+    """Return columns as a DataFrame of pandas, one row for each case.  Raise MumacroError if pandas
+    is not installed."""
     try:
         import pandas
     except ModuleNotFoundError:
@@ -157,15 +160,15 @@ def frame_of(columns: Mapping[str, Any]) -> Any:
 
 
 def cell(value: Any) -> str:
-    """Return one value of a table."""
+    """Return one value of a table as text."""
     if isinstance(value, (float, np.floating)):
         return f"{value:.{_DIGITS}g}"
     return str(value)
 
 
 def _table_of(columns: Mapping[str, Any]) -> list[list[str]]:
-    """Return the heads of columns, and of their rows (n,) the first and the last; places stand
-    before them."""
+    """Return the rows of a table as texts: the headers first, then the first and the last rows of
+    the columns (n,).  Each row begins with its index."""
     arrays = [np.asarray(x) for x in columns.values()]
     shape = arrays[0].shape if arrays else (0,)
     size = math.prod(shape)
@@ -180,7 +183,7 @@ def _table_of(columns: Mapping[str, Any]) -> list[list[str]]:
 
 
 def _fitting(table: Sequence[Sequence[str]]) -> tuple[list[str], int]:
-    """Return the rows of a table as lines, and how many of its last columns do not fit them."""
+    """Return the rows of a table as lines, and how many of its last columns do not fit in them."""
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     count = len(widths)
     while count > 2 and 2 * count + sum(widths[:count]) > WIDTH:
@@ -205,8 +208,8 @@ def _broken(line: str) -> list[str]:
 def _text_of(
     heading: str, lines: Sequence[str], notes: Iterable[str], notes_first: bool = False
 ) -> str:
-    """Return a heading, lines and notes below them, in at most 16 lines of 100 characters; what
-    does not fit are the last notes, or with ``notes_first`` the last lines."""
+    """Return a heading, lines and notes below them, in at most 16 lines of 100 characters.  If
+    there is too much, leave out the last notes, or with ``notes_first`` the last lines."""
     below = [part for note in notes for part in _broken(f"  {note}")]
     if notes_first:
         below = below[: LINES - 2]
@@ -215,15 +218,15 @@ def _text_of(
 
 
 def _aligned(rows: Rows) -> list[str]:
-    """Return rows of cells as lines of 100 characters at most."""
+    """Return rows of cells as lines of at most 100 characters."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ("  ".join(x.ljust(n) for x, n in zip(row, widths, strict=True)) for row in rows)
     return [f"  {line}".rstrip()[:WIDTH] for line in lines]
 
 
 def _table_lines(columns: Mapping[str, Any]) -> list[str]:
-    """Return the first and the last rows of columns as lines; columns that do not fit are
-    counted."""
+    """Return the first and the last rows of columns as lines, and count the columns that do not
+    fit."""
     if not columns:
         return []
     lines, rest = _fitting(_table_of(columns))

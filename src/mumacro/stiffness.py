@@ -1,7 +1,7 @@
-"""Tangential contact stiffness from materials and geometry: the input k that every evaluation
-needs.
+"""Compute tangential contact stiffness from materials and geometry: the input k that every
+evaluation needs.
 
-Half-space elasticity, two smooth elastic bodies, small strains::
+The theory is half-space elasticity: two smooth elastic bodies, small strains::
 
     1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2
     1/G* = (2 - nu1)/G1 + (2 - nu2)/G2,   G = E / (2 (1 + nu))
@@ -13,20 +13,20 @@ Half-space elasticity, two smooth elastic bodies, small strains::
                                       k of an elliptic contact: two values
 
 k is the stiffness of a contact that sticks everywhere.  Under a ball the rim slips first, and gross
-slip begins at the displacement 3/2 mu0 Fz/k: ``contact="ball"``, which no single spring stands for.
-Under a flat punch with full contact all of it slips at once, and one spring is exact.  A result
-holds both, k and the kind of the contact::
+slip begins at the displacement 3/2 mu0 Fz/k.  No single spring can represent this: use
+``contact="ball"``.  Under a flat punch with full contact the whole contact slips at once, and one
+spring is exact.  A result holds both k and the contact::
 
     ball = ball_on_flat(5e-3, 10.0, steel, steel)
     surrogate.evaluate(**ball, mu0=0.3, Fz=10.0, y0=2e-6, f=20e3, v0=0.01)
 
-Every function raises :class:`mumacro.InputError` for a value out of bounds or no number, for two
-rigid bodies, and where Hertz's theory has no meaning: a contact wider than the ball.  Above a tenth
-of the ball's radius it warns.
+Every function raises :class:`mumacro.InputError` for a value that is out of bounds or not a number,
+for two rigid bodies, and if Hertz's theory has no meaning because the contact is wider than the
+ball.  Above a tenth of the ball's radius it warns.
 
-Not included: roughness, which adds compliance in series (:func:`in_series`); layers; plastic flow,
-which begins below the surface at a Hertz pressure of about 1.6 times the yield strength; the
-compliance of the holder, in series as well.
+Not included are: roughness and the holder, whose compliances are in series (:func:`in_series`);
+layers; and plastic flow, which begins below the surface at a Hertz pressure of about 1.6 times the
+yield strength.
 
 References
 ----------
@@ -47,13 +47,15 @@ from mumacro.inputs.cases import real
 from mumacro.notes import WARNING, Note
 from mumacro.results import Result, Rows
 
-SMALLEST, LARGEST = 1e-60, 1e60  # numbers in SI; every product of them below is a double
-AXES = ("across", "along")  # directions of oscillation beside the axis of a cylinder
-# the half width of a contact over the radius of ball or cylinder above which Hertz's theory is off
+# limits of numbers in SI, so that every product of them below is a double
+SMALLEST, LARGEST = 1e-60, 1e60
+AXES = ("across", "along")  # directions of oscillation relative to the axis of a cylinder
+# the half width of a contact, divided by the radius of ball or cylinder, above which Hertz's theory
+# is inaccurate
 WIDE = 0.1
-#: what a contact has: the unit of each number
+#: members of a contact: the unit of each number
 NUMBERS = {"k": "N/m", "k_normal": "N/m", "half_width": "m", "pressure": "Pa"}
-SOFT = 1e6  # [Pa]; a modulus below it may be meant in GPa
+SOFT = 1e6  # [Pa]; a smaller modulus was perhaps meant in GPa
 
 
 def _number(name: str, value: Any) -> float:
@@ -72,8 +74,8 @@ def _positive(**values: Any) -> list[float]:
     return [*numbers.values()]
 
 
-#: E [Pa] and nu of usual materials: the middle of the ranges that Gere prints; of steel the values
-#: of EN 1993-1-1, which are within them
+#: E [Pa] and nu of common materials: the middle of the ranges that Gere prints.  For steel the
+#: values of EN 1993-1-1, which are within these ranges
 MATERIALS = {
     "steel": (210e9, 0.3),
     "aluminium alloy": (70e9, 0.33),
@@ -91,8 +93,8 @@ SOURCE_OF_MATERIALS = "typical values after Gere, Mechanics of Materials, 5th ed
 
 
 def _named(name: str) -> tuple[float, float] | None:
-    """Return E and nu of a usual material, whatever the case of its name and the spaces in it, and
-    without the word alloy, too; None for another text."""
+    """Return E and nu of a common material, or None for another text.  Case and spaces in the name
+    do not matter, and the word alloy may be missing."""
     words = name.lower().replace("-", " ").replace("_", " ").split()
     for known, numbers in MATERIALS.items():
         if words in (known.split(), known.removesuffix(" alloy").split()):
@@ -102,10 +104,10 @@ def _named(name: str) -> tuple[float, float] | None:
 
 @dataclass(frozen=True)
 class Material:
-    """An isotropic elastic body: Young's modulus E [Pa] > 0, ``math.inf`` if rigid; Poisson's ratio
-    -1 < nu <= 0.5.
+    """Hold an isotropic elastic body: Young's modulus E [Pa] > 0, ``math.inf`` if rigid; Poisson's
+    ratio -1 < nu <= 0.5.
 
-    Or a usual one by its name alone, of :data:`MATERIALS`.
+    A common material is known by its name alone, see :data:`MATERIALS`.
 
     >>> steel = Material(E=210e9, nu=0.3)
     >>> round(steel.G / 1e9, 2), Material("steel") == steel
@@ -132,28 +134,29 @@ class Material:
 
     @property
     def G(self) -> float:
-        """Shear modulus [Pa]."""
+        """Return the shear modulus [Pa]."""
         return self.E / (2.0 * (1.0 + self.nu))
 
 
 @dataclass(frozen=True, repr=False)
 class Contact(Result):
-    """What a contact of two bodies is; ``evaluate(**contact, ...)`` gets its ``k`` and its
+    """Hold the contact of two bodies; ``evaluate(**contact, ...)`` takes its ``k`` and its
     ``contact``."""
 
     k: float  #: tangential stiffness [N/m] while it sticks everywhere: the input of the model
     k_normal: float  #: normal stiffness [N/m]
     half_width: float  #: radius of a circular contact, half width of a line contact [m]
-    #: the largest [Pa]: Hertz's, or the mean one under a flat punch, singular at its edge
+    #: the largest pressure [Pa]: Hertz's; under a flat punch the mean one, since the pressure is
+    #: singular at the edge
     pressure: float
-    contact: str = "spring"  #: the kind that ``evaluate`` computes with this k: "spring" or "ball"
-    #: warnings where the theory behind k is off, also issued by ``warnings``; and remarks on the
+    #: the contact that ``evaluate`` computes with this k: "spring" or "ball"
+    contact: str = "spring"
+    #: warnings if the theory of k is inaccurate (``warnings`` issues them, too), and remarks on the
     #: geometry
     notes: tuple[Note, ...] = ()
 
     def keys(self) -> tuple[str, ...]:
-        """Return the keywords for ``evaluate``: k, and the kind of contact where it is not one
-        spring."""
+        """Return the keywords for ``evaluate``: k, and the contact if it is not one spring."""
         return ("k",) if self.contact == "spring" else ("k", "contact")
 
     def __getitem__(self, name: str) -> Any:
@@ -163,7 +166,7 @@ class Contact(Result):
 
     @property
     def columns(self) -> dict[str, float]:
-        """The numbers by name."""
+        """Return the numbers by name."""
         return {name: getattr(self, name) for name in NUMBERS}
 
     def _members(self) -> dict[str, Any]:
@@ -199,8 +202,8 @@ def _moduli(first: Material, second: Material) -> tuple[float, float]:
 def _hertz_cautions(
     half_width: float, radius: float, first: Material, second: Material, power: float
 ) -> tuple[Note, ...]:
-    """Return warnings of a Hertzian contact that is wide beside the radius of the body; InputError
-    where it is wider.
+    """Return warnings of a Hertzian contact that is wide compared with the radius of the body.
+    Raise InputError if it is wider than the body.
 
     The half width is proportional to E* to the power -``power``.
     """
@@ -234,19 +237,20 @@ def _hertz_cautions(
 
 
 def _issue_warnings(contact: Contact) -> Contact:
-    """Return the contact, whose warnings are issued to the caller of the caller."""
+    """Return the contact after its warnings were issued to the caller of the caller."""
     for text in contact.warnings:
         warnings.warn(text, stacklevel=3)
     return contact
 
 
 def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) -> Contact:
-    """Return a ball on a flat, or two balls: Hertz's radius, Mindlin's stiffness.
+    """Compute the contact of a ball on a flat, or of two balls: Hertz's radius, Mindlin's
+    stiffness.
 
     Parameters
     ----------
     radius : float
-        Radius of the ball [m]; of two balls 1/(1/R1 + 1/R2).
+        Radius of the ball [m]; for two balls 1/(1/R1 + 1/R2).
     Fz : float
         Normal force [N]; k grows with Fz^(1/3), so that l0 grows with Fz^(2/3).
     first, second : Material
@@ -254,8 +258,8 @@ def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) ->
 
     Notes
     -----
-    Johnson (1985), eqs. (4.22), (7.42).  Holds for half_width << radius: above 0.1 of it there is a
-    warning, above the radius an error.  The normal stiffness is the tangent dFz/dz.
+    See Johnson (1985), eqs. (4.22), (7.42).  The result holds for half_width << radius: above 0.1 of it
+    there is a warning, above the radius an error.  The normal stiffness is the tangent dFz/dz.
 
     Examples
     --------
@@ -270,7 +274,7 @@ def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) ->
 
 
 def hertz_ball(radius: float, Fz: float, first: Material, second: Material) -> Contact:
-    """Return :func:`ball_on_flat`, whose warnings are in the result alone."""
+    """Return :func:`ball_on_flat`, but with warnings only in the result."""
     radius, Fz = _positive(radius=radius, Fz=Fz)
     modulus, shear = _moduli(first, second)
     a = (0.75 * (Fz / modulus) * radius) ** (1.0 / 3.0)
@@ -281,16 +285,16 @@ def hertz_ball(radius: float, Fz: float, first: Material, second: Material) -> C
 
 
 def flat_punch(radius: float, Fz: float, first: Material, second: Material) -> Contact:
-    """Return a flat circular end in full contact, such as a pin that has run in.
+    """Compute the contact of a flat circular end in full contact, such as a pin after running in.
 
     Parameters
     ----------
     radius : float
         Radius of the face [m].
     Fz : float
-        Normal force [N]; sets the pressure only, k does not depend on it.
+        Normal force [N]; it sets only the pressure, k does not depend on it.
     first, second : Material
-        The two bodies; exact for a rigid punch on a half-space.
+        The two bodies; the result is exact for a rigid punch on a half-space.
 
     Examples
     --------
@@ -309,38 +313,39 @@ def flat_punch(radius: float, Fz: float, first: Material, second: Material) -> C
 def cylinder_on_flat(
     radius: float, length: float, Fz: float, first: Material, second: Material, oscillation: str
 ) -> Contact:
-    """Return a cylinder lying on a flat: Hertz's half width, the stiffness of an elongated contact
-    in one of two directions.
+    """Compute the contact of a cylinder lying on a flat: Hertz's half width, the stiffness of an
+    elongated contact in one of two directions.
 
-    With nu > 0 k across the axis is the larger one, by up to 1/(1 - nu); the model has one k.
-    **The direction of the oscillation decides**: where the two differ by 1.3, mu~ with its k is
-    right to 0.02, with the other one to 0.13 only (y~ from 0.3 to 10, v~ from 0.2 to 2).
+    With nu > 0, k across the axis is the larger one, by up to 1/(1 - nu); the model has one k.
+    **The direction of the oscillation decides.** If the two k differ by a factor of 1.3, mu~ with
+    the k of the oscillation is right to 0.02, with the other k only to 0.13 (y~ from 0.3 to 10, v~
+    from 0.2 to 2).
 
-    A line contact of unlimited length has no stiffness.  Here it is finite, and is replaced by the
-    ellipse of the same area and proportions, which under a tangential force moves as one: right to
-    about 10 % where the bodies are large beside ``length``.
+    A line contact of infinite length has no stiffness.  Here the length is finite.  The contact is
+    replaced by the ellipse of the same area and proportions, which moves as a whole under a
+    tangential force.  This is right to about 10 % if the bodies are large compared with ``length``.
 
     Parameters
     ----------
     radius, length : float
-        Of the cylinder [m].
+        Radius and length of the cylinder [m].
     Fz : float
         Normal force [N].
     first, second : Material
         The two bodies.
     oscillation : str
-        "across" or "along" the cylinder's axis: how the contact oscillates, whichever way it
-        slides.
+        "across" or "along" the cylinder's axis: the direction of the oscillation, whatever the
+        sliding direction is.
 
     Raises
     ------
     InputError
-        Also for a contact wider than long, which is no line contact.
+        Also if the contact is wider than long, because then it is not a line contact.
 
     Notes
     -----
     Half width: Johnson (1985), eq. (4.43).  Stiffness: Mindlin (1949), by integrating Cerruti's
-    solution under the traction that moves an ellipse as one.
+    solution under the traction that moves an ellipse as a whole.
 
     Examples
     --------
@@ -357,7 +362,7 @@ def cylinder_on_flat(
 def hertz_cylinder(
     radius: float, length: float, Fz: float, first: Material, second: Material, oscillation: str
 ) -> Contact:
-    """Return :func:`cylinder_on_flat`, whose warnings are in the result alone."""
+    """Return :func:`cylinder_on_flat`, but with warnings only in the result."""
     if oscillation not in AXES:
         raise InputError(
             "oscillation",
@@ -375,7 +380,7 @@ def hertz_cylinder(
             length,
             f">= {2.0 * b:.3g}, the width of the contact; a shorter one is a punch",
         )
-    scale = 2.0 / math.sqrt(math.pi)  # of the ellipse whose area is that of the rectangle
+    scale = 2.0 / math.sqrt(math.pi)  # of the ellipse that has the area of the rectangle
     narrow, wide = scale * b, scale * 0.5 * length
     shear = 1.0 / sum(_ellipse_compliance(narrow, wide, body, along) for body in (first, second))
     normal = 1.0 / sum(
@@ -390,9 +395,9 @@ def _ellipse_compliance(narrow: float, wide: float, body: Material, along: bool)
     y^2/wide^2)^(-1/2).
 
     At the middle it is (1/(8 pi G narrow wide)) times the integral over all directions of R ((1 -
-    nu) + nu c^2), R the half chord, c the cosine with the force.  With the complete elliptic
-    integrals of modulus m = sqrt(1 - (narrow/wide)^2) this is K ((1 - nu) + nu s) / (2 pi G wide),
-    s = (K - E)/(m^2 K) along the wide axis, else 1 - s.
+    nu) + nu c^2), where R is half of the chord and c the cosine of the angle to the force.  With
+    the complete elliptic integrals of modulus m = sqrt(1 - (narrow/wide)^2) this is K ((1 - nu) +
+    nu s) / (2 pi G wide), with s = (K - E)/(m^2 K) along the wide axis, otherwise 1 - s.
     """
     a, g = 1.0, narrow / wide  # K = pi / (2 agm(1, narrow/wide)), and s is a sum of the same means
     share = term = 0.5
@@ -405,7 +410,7 @@ def _ellipse_compliance(narrow: float, wide: float, body: Material, along: bool)
 
 
 def in_series(*stiffnesses: float) -> float:
-    """Return stiffness [N/m] > 0 of springs in series, such as contact, roughness and holder;
+    """Return the stiffness [N/m] > 0 of springs in series, such as contact, roughness and holder;
     ``math.inf`` is a rigid part.
 
     >>> round(in_series(3e6, 6e6))

@@ -1,5 +1,5 @@
-"""A computation that another thread can end: a flag that it looks at between its pieces of work,
-and the kernel at every step of a motion.
+"""Let another thread end a computation: it checks a flag between its pieces of work, and the kernel
+checks it at every step of a motion.
 
 >>> stop = Stop()
 >>> with stop.of_this_thread():
@@ -20,27 +20,27 @@ from mumacro.errors import MumacroError
 
 
 class StopError(MumacroError):
-    """The computation was ended by another thread."""
+    """Report that another thread ended the computation."""
 
 
 class Stop:
-    """A flag; once it is set, what looks at it ends."""
+    """Hold a flag; once it is set, every computation that checks it ends."""
 
     def __init__(self) -> None:
-        self.flag = np.zeros(1, np.int32)  # which the kernel reads, too
+        self.flag = np.zeros(1, np.int32)  # the kernel reads it, too
 
     def set(self) -> None:
-        """Ask what looks at it to end."""
+        """Ask the computations that check this flag to end."""
         self.flag[0] = 1
 
     def look(self) -> None:
-        """Raise StopError where the flag is set."""
+        """Raise StopError if the flag is set."""
         if self.flag[0]:
             raise StopError("the computation was ended")
 
     @contextmanager
     def of_this_thread(self) -> Iterator[None]:
-        """Let the computations of this thread look at the flag, until the context ends."""
+        """Let the computations of this thread check the flag, until the context ends."""
         token = _CURRENT.set(self)
         try:
             yield
@@ -52,10 +52,10 @@ _CURRENT = ContextVar("mumacro.stop", default=Stop())  # noqa: B039  (never set)
 
 
 def current() -> Stop:
-    """Return the flag that computations of this thread look at."""
+    """Return the flag that computations of this thread check."""
     return _CURRENT.get()
 
 
 def look() -> None:
-    """Raise StopError where the computation of this thread is to end."""
+    """Raise StopError if the computation of this thread must end."""
     _CURRENT.get().look()

@@ -1,9 +1,10 @@
-"""How far the model holds for a case: the rows of docs/validity.md that apply to it, with the size
-of each effect.
+"""Tell how far the model holds for a case: the rows of docs/validity.md that apply to it, with the
+size of each effect.
 
-The error bound of an answer is the table's distance to the model.  How far the model is from a
-contact is another question, and mostly the larger one.  Two assumptions cannot be judged from the
-inputs of a case, and have no row here: quasi-static contact, which needs masses, and a stiff drive.
+The error bound of an answer is the distance of the table from the model.  The distance of the model
+from a real contact is another question, and usually it is larger.  Two assumptions cannot be
+checked with the inputs of a case and have no row here: a quasi-static contact, which needs masses,
+and a stiff drive.
 """
 
 import math
@@ -32,30 +33,29 @@ ROWS = (
     "constant normal force",
     "no wear, no heating",
 )
-K_UNCERTAINTY = (
-    0.1  # relative uncertainty of k by default: materials and geometry give no better one
-)
+K_UNCERTAINTY = 0.1  # default relative uncertainty of k: materials and geometry give no better one
 HARDLY = 20.0  # y~ from which on mu_macro hardly depends on k (docs/validity.md)
-_RATE = 0.01  # a of mu0 + a ln(slip speed), rock, polymers and metals (docs/validity.md)
+_RATE = 0.01  # a of mu0 + a ln(slip speed) for rock, polymers and metals (docs/validity.md)
 _TILT, _NORMAL = 0.01, 1.21  # misalignment; normal over tangential stiffness of steel on steel
-# slip paths [m] between which a row is shown: friction follows a new slip speed after micrometres
+# slip paths [m] between which a row is shown, since friction follows a new slip speed after
+# micrometres
 _ADAPTS = 1e-7, 1e-4
-_PERIODS, _WATTS = 100.0, 0.1  # above them there is a row on settling, and one on heat
+_PERIODS, _WATTS = 100.0, 0.1  # above these there is a row on settling, and one on heat
 
 
 class Said(NamedTuple):
-    """What is said of one case, and the digits that it supports."""
+    """Hold the notes on one case, and the number of digits that it supports."""
 
     notes: list[Note]
     digits: int
 
 
 def notes_of(answer: Answer[float], units: Mapping[str, str] | None = None) -> Said:
-    """Return what is said of an evaluated case: what the model leaves out, with the size of each
-    effect, what is doubtful, and how many digits k supports.
+    """Return the notes on an evaluated case: what the model leaves out, with the size of each
+    effect; what is doubtful; and how many digits the uncertainty of k supports.
 
-    The only values of the table beyond the answer are those of its neighbours: the other contact,
-    and seven values of k up to 10 % away.  ``units`` are those that were typed, by input.
+    Other values of the table are needed only for comparison: with the other contact, and with seven
+    values of k up to 10 % away.  ``units`` are the units that were typed, by input.
 
     Examples
     --------
@@ -71,10 +71,10 @@ def notes_of(answer: Answer[float], units: Mapping[str, str] | None = None) -> S
 
 
 def rows_of(answer: Answer[float], effect: float | None = None) -> list[Row]:
-    """Return the rows of docs/validity.md that an evaluated case falls in, as JSON has them.
+    """Return the rows of docs/validity.md that apply to an evaluated case, as JSON has them.
 
-    Where no contact has the case's y~, the remark on that stands alone.  ``effect`` is
-    :func:`effect_of` the answer, where it is there already.
+    If no contact has the case's y~, the remark on this is the only row.  ``effect`` is
+    :func:`effect_of` the answer, if it is already known.
     """
     effect = effect_of(answer) if effect is None else effect
     if _is_beyond(answer):
@@ -90,14 +90,15 @@ def _is_elastic(answer: Answer[float]) -> bool:
 
 
 def _is_beyond(answer: Answer[float]) -> bool:
-    """Return whether no contact has the y~ of a case that is elastic and shaken."""
+    """Return whether a case is elastic and shaken, but no contact has its y~."""
     return _is_elastic(answer) and not answer.cases.kind.normal and answer.y_tilde > FURTHEST
 
 
 def _assumptions(answer: Answer[float], effect: float) -> list[Note]:
-    """Return what the model leaves out in a case, of an interval of k in its geometric middle.
+    """Return what the model leaves out in a case; for an interval of k at its geometric middle.
 
-    Where k is an interval or has a deviation, there is no note on k: the answer shows what follows.
+    If k is an interval or has a deviation, there is no note on k, because the answer shows the
+    effect.
     """
     if not _is_elastic(answer) or _is_beyond(answer):
         return []
@@ -119,7 +120,7 @@ def load_notes(
     contact: str = "spring",
     stiffening: Stiffening | None = None,
 ) -> list[Note]:
-    """Return the note on k where Fz is swept or solved for, if there is one.
+    """Return the note on k if Fz is swept or solved for, as a list that may be empty.
 
     ``case`` has the other five inputs, ``stiffening`` says how k grows, as in the result.
 
@@ -149,12 +150,13 @@ def load_notes(
 def effect_of(
     answer: Answer[Any], uncertainty: float = K_UNCERTAINTY, place: int | None = None
 ) -> float:
-    """Return by how much, relatively, mu_macro may differ [-] where k may by the factor 1 +
+    """Return how much mu_macro may differ, relatively [-], if k may differ by the factor 1 +
     ``uncertainty`` up or down; 0 if rigid.
 
-    The largest of seven values of k counts, since mu_macro is no straight line in k.  Over an
-    interval of k it is half the width.  Of many cases it is that of the one at ``place`` of the
-    flattened arrays, which have groups; without it InputError.
+    It is the largest difference for seven values of k, because mu_macro is not a straight line in
+    k.  Over an interval of k it is half the width.  For many cases it is that of the case at
+    ``place`` of the flattened arrays, which must have groups; without ``place`` InputError is
+    raised.
     """
     if place is None and np.shape(answer.mu_macro):
         raise InputError("answer", np.shape(answer.mu_macro), "that to one case")
@@ -171,10 +173,10 @@ def effect_of(
 def effect_of_groups(
     tabulated: Tabulated, kind: Kind, v: float, y: float, uncertainty: float = K_UNCERTAINTY
 ) -> float:
-    """Return :func:`effect_of` a case with one k, by its v~ and y~."""
+    """Return :func:`effect_of` a case with one k, from its v~ and y~."""
     if not 0.0 < uncertainty < math.inf:
         raise InputError("uncertainty", uncertainty, "finite and > 0")
-    if math.isinf(v) or math.isinf(y):  # rigid, or not shaken: k is no part of the answer
+    if math.isinf(v) or math.isinf(y):  # rigid, or not shaken: k has no influence
         return 0.0
     factors = np.geomspace(1.0 / (1.0 + uncertainty), 1.0 + uncertainty, 7)
     amplitudes = np.full(factors.size, y) if kind.normal else y * factors
@@ -188,8 +190,8 @@ def _share(half_width: float, middle: float) -> float:
 
 
 def digits(uncertainty: float, least: int = 4, most: int = 6) -> int:
-    """Return digits to show of a number that is known to ``uncertainty``, relatively: one beyond
-    the first that it moves.
+    """Return how many digits to show of a number with the relative uncertainty ``uncertainty``: one
+    more than the first digit that it changes.
 
     >>> digits(0.06), digits(3e-5), digits(0.0)
     (4, 6, 6)
@@ -254,7 +256,7 @@ def _on_tilt(mu0: float, y: float) -> Note | None:
 
 
 def _on_cycle(answer: Answer[float], six: Mapping[str, Any]) -> list[Note]:
-    """Return what follows from the slip path of a period, taken from one spring."""
+    """Return the notes that follow from the slip path of a period, computed for one spring."""
     groups = (np.array([x]) for x in (answer.v_tilde, answer.y_tilde))
     rate = float(decay_of_springs(answer._surrogate.tabulated, *groups).rate[0])
     slip = 2.0 * math.pi * rate  # over l0

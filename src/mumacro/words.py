@@ -1,4 +1,4 @@
-"""The answer to one case in words: what the command prints, and a notebook shows."""
+"""Put the answer to one case into words, as the command prints it and a notebook shows it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -19,19 +19,19 @@ REGIMES = {
     "each period",
     "reverse_slip": "slips forwards and backwards in each period",
 }
-#: rows of validity.ROWS with another word for a contact
+#: rows of validity.ROWS that have another name for a contact
 _CALLED = {("one spring", "ball"): "a ball"}
-_SHOWN = ("std", "std_share", "gradient")  # in rows of their own
+_SHOWN = ("std", "std_share", "gradient")  # these are shown in their own rows
 
 
 def of_one_case(
     answer: Answer[Any], shown: int | None = None, units: Mapping[str, str] | None = None
 ) -> tuple[Rows, Rows, str]:
-    """Return rows of name, value, unit and meaning; what the answer assumes, and remarks, each with
-    the word for which of them it is; and its numerical error.
+    """Return three things: rows of name, value, unit and meaning; what the answer assumes and its
+    remarks, each with its type; and the numerical error.
 
-    Numbers have the digits that are known, and the unit that ``units`` has for their input, or else
-    the one that suits them; with ``shown`` that many digits, in SI.
+    Numbers have their significant digits, and the unit that ``units`` has for their input, or else
+    a suitable unit.  With ``shown`` they have this many digits, in SI.
     """
     kind, case = answer.cases.kind, answer.cases.columns
     said = notes_of(answer, units)
@@ -41,8 +41,8 @@ def of_one_case(
 
 
 def in_words(note: Note, kind: Kind, case: Mapping[str, Any]) -> Note:
-    """Return a note on a case in the words of its contact, a ball is not one spring, and with what
-    is typed in place of an advice.
+    """Return a note on a case in the words of its contact (a ball is not one spring), with a value
+    to type as advice.
 
     >>> from mumacro.inputs.fields import kind_of
     >>> in_words(Note("assumes", "...", "one spring"), kind_of("ball"), {"k": 1.0}).row

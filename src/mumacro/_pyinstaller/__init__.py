@@ -1,4 +1,4 @@
-"""What PyInstaller needs to know: it asks the entry point ``pyinstaller40`` of the wheel."""
+"""Tell PyInstaller where the hooks are; it calls the entry point ``pyinstaller40`` of the wheel."""
 
 from pathlib import Path
 

@@ -1,5 +1,5 @@
 # ruff: noqa: N999 - PyInstaller finds a hook by this name
-"""What an application made by PyInstaller must contain: the compiled kernel, the tables, and the
+"""Tell PyInstaller what an application must contain: the compiled kernel, the tables, and the
 modules that are imported by name when they are first used."""
 
 from PyInstaller.utils.hooks import (  # type: ignore[import-untyped, import-not-found, unused-ignore]
@@ -7,7 +7,7 @@ from PyInstaller.utils.hooks import (  # type: ignore[import-untyped, import-not
     collect_submodules,
 )
 
-# the parts that need other programs stay out
+# parts that need other programs are left out
 _APART = ("mumacro.service", "mumacro.builder", "mumacro._pyinstaller")
 
 datas = collect_data_files("mumacro", includes=["**/*.so", "**/*.dll", "**/*.dylib", "data/*.nc"])
