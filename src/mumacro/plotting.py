@@ -1,5 +1,6 @@
 """Draw pictures with matplotlib, which is loaded for the first picture.
-They draw what they get: arrays, names and marks.
+
+The functions draw what they get: arrays, names and marks.
 
 The methods ``plot`` of :class:`mumacro.Surrogate`, :class:`mumacro.Answer`, of a law, of solutions,
 motions and fits fill in the numbers.  Each draws on ``ax``: matplotlib axes of the caller, or new

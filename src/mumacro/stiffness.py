@@ -258,8 +258,9 @@ def ball_on_flat(radius: float, Fz: float, first: Material, second: Material) ->
 
     Notes
     -----
-    See Johnson (1985), eqs. (4.22), (7.42).  The result holds for half_width << radius: above 0.1 of it
-    there is a warning, above the radius an error.  The normal stiffness is the tangent dFz/dz.
+    See Johnson (1985), eqs. (4.22), (7.42).  The result holds for half_width << radius: above 0.1
+    of the radius there is a warning, above the radius an error.  The normal stiffness is the
+    tangent dFz/dz.
 
     Examples
     --------
