@@ -7,6 +7,7 @@ refused with its line.
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 
 from mumacro.errors import TextError
 from mumacro.inputs.cells import (
@@ -231,9 +232,8 @@ def units_in_legend(line: str, names: Sequence[str]) -> Iterator[tuple[str, str]
         if len(units := [unit for unit in units if unit not in NO_UNIT]) == 1:
             yield first.strip(" \"'"), units[0]
             return
-    places = [*_places_of_names(line, [name for name in names if name and name in line])]
-    ends = [start for start, _ in places[1:]] + [len(line)]
-    for (start, name), end in zip(places, ends, strict=True):
+    present = [name for name in names if name and name in line]
+    for (start, name), (end, _) in pairwise([*_places_of_names(line, present), (len(line), "")]):
         behind = line[start + len(name) : end].rstrip(" ,;|\t\"'.")
         unit = _unit_in_legend(behind)
         if unit is not None:

@@ -1,7 +1,9 @@
 """Layouts that rigs, oscilloscopes, loggers, spreadsheets and programs export, made after their
 public descriptions: each is read as it is meant, or refused with its line and the remedy."""
 
+import random
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -249,3 +251,38 @@ def test_a_layout_is_refused_with_its_line_and_a_remedy_that_works(path: Path, n
         unit = 1.0 if points.units["v0"] == "mm/s" else 1e3
         assert points.columns["v0"].tolist() == close([unit * v for v in V0[:n]], rel=1e-12)
         assert points.columns["mu_macro"].tolist() == close(MU[:n], rel=1e-12)
+
+
+#: what damage puts between the characters of a table
+PIECES = ("\n", "\n\n", ",", ";", "\t", '"', "#", " ", "-", "1", "1,5", "v0", "mu_macro", "y0")
+WORDS = ("mm/s", "[mm/s]", "units", "mean", "%", "{", "±", "..", "1e999", "***End_of_Header***\n")
+
+
+def damaged(text: str, chance: random.Random) -> str:
+    """Return a table in which characters were put in or left out, or a line stands twice."""
+    for _ in range(chance.randint(1, 6)):
+        place, kind = chance.randrange(len(text) + 1), chance.random()
+        if kind < 0.5:
+            piece = chance.choice(PIECES + WORDS) * chance.choice((1, 1, 2, 5))
+            text = text[:place] + piece + text[place:]
+        elif kind < 0.8:
+            text = text[:place] + text[place + chance.randint(1, 12) :]
+        else:
+            lines = text.split("\n")
+            lines.insert(chance.randrange(len(lines) + 1), chance.choice(lines))
+            text = "\n".join(lines)
+    return text
+
+
+def test_a_damaged_layout_is_read_or_refused_with_a_reason(tmp_path: Path) -> None:
+    chance, path = random.Random(1), tmp_path / "table.txt"  # noqa: S311
+    texts = [text for text in READ.values() if isinstance(text, str)]
+    texts += [text for text, _ in REFUSED.values()]
+    # a name within a word, and no other name, in a line of names and units
+    path.write_text("5-----\t0.174\nmu_macro2\t0.097\nv0\tmu_macro\nrun 7\tmean\n")
+    with suppress(TextError):
+        read_points(path)
+    for _ in range(400):
+        path.write_bytes(damaged(chance.choice(texts), chance).encode())
+        with suppress(TextError):  # anything else fails the test
+            read_points(path)
