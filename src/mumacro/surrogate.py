@@ -575,6 +575,8 @@ class Surrogate:
             and contact in _SHORT
             and (f is ABSENT or omega is ABSENT)
             and not unknown_names
+            and type(gradient) is bool
+            and type(illegal) is str
             and illegal == "nan"
         ):
             # One case across in plain numbers takes this short way, in a third of the time.  What
@@ -607,8 +609,10 @@ class Surrogate:
             is_labelled = has_labels(values.values()) or bool(
                 cases is not None and frame_of_cases(cases)
             )
-        if illegal not in ILLEGAL:
+        if not (type(illegal) is str and illegal in ILLEGAL):
             raise InputError("illegal", illegal, '"nan" or "raise"')
+        if not isinstance(gradient, (bool, np.bool_)):
+            raise InputError("gradient", gradient, "True or False")
         strict = illegal == "raise"
         if is_labelled:
             names = [*names_in(include), *["gradient"] * bool(gradient)]

@@ -325,8 +325,22 @@ def test_cases_and_keywords_go_together_without_overlap(table: Surrogate) -> Non
     for bad in ([1.0], 3.0, "cases", object()):
         with refused("cases"):
             table.evaluate(bad)
-    with refused("illegal"):
-        table.evaluate(**CASE, illegal="ignore")
+
+
+OPTIONS: dict[str, list[Any]] = {
+    "gradient": ["yes", "", None, 1, [], np.ones(2)],
+    "illegal": ["ignore", None, True, np.array(["nan", "raise"])],
+    "include": [3, ["power", 3], "groups,x"],
+    "contact": [3, b"ball", np.ones(2), "cylinder"],
+    "direction": [None, "down"],
+}
+
+
+@pytest.mark.parametrize(("name", "bad"), [(n, x) for n, xs in OPTIONS.items() for x in xs])
+def test_an_option_is_refused_by_its_name(table: Surrogate, name: str, bad: Any) -> None:
+    for k in (CASE["k"], np.array([1e6, 2e6])):
+        with refused(name):
+            table.evaluate(**{**CASE, "k": k, name: bad})
 
 
 def test_rigid_is_given_as_the_word_or_infinity_in_numbers_and_in_arrays(table: Surrogate) -> None:

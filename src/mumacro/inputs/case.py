@@ -45,6 +45,7 @@ _LAST_DIGITS = re.compile(
     r"(?P<number>[+-]?\d{1,15}(?:[.,](?P<part>\d{1,15}))?)\((?P<std>\d{1,9})\)(?P<unit> ?\D{0,40})",
     re.ASCII,
 )
+_NOT_FINITE = re.compile("[+-]?(inf|infinity|nan)", re.IGNORECASE | re.ASCII)
 # above, a ratio before a deviation in per cent may be meant in per cent, too
 _SURE_RATIO = 1.5
 
@@ -217,7 +218,7 @@ def _of_text(name: str, quantity: str, raw: str) -> Value:
     rigid = quantity in OR_RIGID
     if rigid and is_rigid(text):
         return Value(math.inf, text=raw)
-    if text.lower().strip("+-") in ("inf", "infinity", "nan"):
+    if _NOT_FINITE.fullmatch(text):
         return Value(float(text), text=raw)
     if not text:
         raise InputError(name, raw, _of_no_number(quantity, "must be a number"))
