@@ -1,4 +1,4 @@
-"""What users hold: a table, and the answers to cases and to points (v~, y~)."""
+"""Hold a table, and answer cases and points (v~, y~): this is the object that users have."""
 
 import copy
 import functools
@@ -67,10 +67,12 @@ _SLOPES = tuple(f"{name}.{field}" for name in ("gradient", "gradient_bound") for
 
 
 class Surrogate:
-    """mu~(v~, y~) from one table; open it once, share it between threads and processes.
+    """Evaluate mu~(v~, y~) from one table; open it once, and share it between threads and
+    processes.
 
-    One policy for all methods: a scalar that is out of bounds raises :class:`InputError`; in an
-    array it gives NaN, with the source code -1.  What is no real number raises in either case.
+    All methods have the same policy.  A scalar that is out of bounds raises :class:`InputError`; in
+    an array it gives NaN, with the source code -1.  A value that is not a real number always
+    raises.
 
     Examples
     --------
@@ -87,7 +89,7 @@ class Surrogate:
         self.path = Path(path)
         self.table = table
         self.attributes = json_attributes(table)
-        #: of one spring, see ``Table.contacts`` for others
+        #: for one spring; ``Table.contacts`` has the others
         self.tolerance = table.contacts["spring"].tolerance
         self.checksum = str(table.attributes.get("content_sha256", ""))
         attributes = table.contacts["spring"].attributes
@@ -108,16 +110,17 @@ class Surrogate:
             A table file; or a tolerance of mu~ [-], for the smallest bundled table that meets it;
             or None for the tightest bundled table.
         threads : int, optional
-            Threads that large arrays are divided among; 1 never starts one.  Left out: all
-            processors when called from the main thread of a program; one in other threads and in
-            child processes, where work is already divided.
+            Number of threads for large arrays; 1 never starts a thread.  Default: all processors in
+            a call from the main thread of a program; one in other threads and in child processes,
+            where work is already divided.
 
         Raises
         ------
         TableError
-            The file is missing, damaged or of another format.
+            If the file is missing, damaged or of another format.
         InputError
-            No bundled table meets the tolerance; ``threads`` is not a whole number from 1 to 1024.
+            If no bundled table meets the tolerance, or ``threads`` is not a whole number from 1 to
+            1024.
 
         Examples
         --------
@@ -134,8 +137,8 @@ class Surrogate:
         return surrogate
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle small: a bundled table by name and checksum, valid on another machine, too;
-        another with its bytes."""
+        """Make a small pickle: a bundled table by name and checksum, which is also valid on another
+        machine; any other table by its bytes."""
         bundled = self.path.resolve() in (path.resolve() for path in bundled_tables())
         path, image = (
             (self.path.name, None)
@@ -158,14 +161,14 @@ class Surrogate:
         contact: str = "spring",
         direction: str = "across",
     ) -> Any:
-        """Return the map of mu~ with a ``point`` (v~, y~) on axes ``ax`` of matplotlib, or new
-        ones, which are returned; see ``mumacro.plotting.plot_map``."""
+        """Draw the map of mu~ with a ``point`` (v~, y~).  ``ax`` are matplotlib axes, or None for
+        new ones.  They are returned; see ``mumacro.plotting.plot_map``."""
         kind = kind_of(contact, direction)
         return self.draw_map(ax, kind, f"{contact}, {direction}", point=point)
 
     def draw_map(self, ax: Any, kind: Kind, title: str, **cases: Any) -> Any:
-        """Return the map of a kind of contact with cases as ``mumacro.plotting.plot_map`` takes
-        them."""
+        """Draw the map of a contact and direction with cases, as ``mumacro.plotting.plot_map``
+        takes them."""
         ratio, border = self.map_of(kind, 281, 201)
         return plotting.plot_map(
             ratio,
@@ -178,14 +181,14 @@ class Surrogate:
         )
 
     def map_of(self, kind: Kind, width: int, height: int) -> tuple[Array, Array]:
-        """Return mu~ (height, width) on the map of a kind of contact, rows from its foot, and
-        v~crit of each row (height,)."""
+        """Return mu~ (height, width) on the map of a contact and direction, rows from the bottom,
+        and v~crit of each row (height,)."""
         v, y = plotting.speeds(width), plotting.amplitudes(height, kind.normal)
         ratio = self.quantity("mu_ratio", v, y[:, None], **kind.names)[0]
         return ratio, self.v_tilde_crit(y, **kind.names)
 
     def regimes_on_map(self, kind: Kind) -> list[str]:
-        """Return the regimes at ``plotting.AREAS`` of the map of a kind of contact."""
+        """Return the regimes at ``plotting.AREAS`` of the map of a contact and direction."""
         v, y = zip(*(plotting.place(*area, kind.normal) for area in plotting.AREAS), strict=True)
         swing = {"Fz_amplitude" if kind.normal else "y0": np.array(y)}
         # v~ = v0 and y~ = y0
@@ -200,18 +203,18 @@ class Surrogate:
 
     @property
     def threads(self) -> int:
-        """Threads that a call from here divides a large array among."""
+        """Return how many threads a call from here uses for a large array."""
         limit = self.tabulated.threads
         return default_threads() if limit is None else limit
 
     @property
     def id(self) -> str:
-        """Name of the table: the file's stem."""
+        """Return the name of the table: the file's stem."""
         return self.path.stem
 
     @property
     def blocks(self) -> list[dict[str, object]]:
-        """JSON-able description of the blocks of every contact."""
+        """Return a description of the blocks of every contact, for JSON."""
         return [
             {
                 "contact": contact.name,
@@ -232,9 +235,10 @@ class Surrogate:
 
     @property
     def error_distribution(self) -> dict[str, dict[str, float]]:
-        """Of the verified errors of every quantity of one spring: those that shares of the points
-        do not exceed, "0.5" to "1", and bound over error, ``least``, ``median`` and ``largest``.
-        Of a ball: ``table.contacts["ball"].error_distribution``.
+        """Return the distribution of the verified errors of every quantity of one spring: the
+        errors that fractions of the points ("0.5" to "1") do not exceed, and bound over error,
+        ``least``, ``median`` and ``largest``.  For a ball see
+        ``table.contacts["ball"].error_distribution``.
 
         >>> errors = Surrogate.open(1e-7).error_distribution["mu_ratio"]
         >>> errors["0.5"] < errors["0.95"] < errors["0.99"] < errors["1"] < 1e-7
@@ -244,7 +248,7 @@ class Surrogate:
 
     @property
     def memory(self) -> int:
-        """Bytes of the cells that an evaluation of mu~ of one spring reads."""
+        """Return the bytes of the cells that an evaluation of mu~ of one spring reads."""
         data = self.tabulated.data()
         return sum(
             array.nbytes
@@ -252,7 +256,7 @@ class Surrogate:
         )
 
     def self_check(self) -> None:
-        """Compare known answers with the table; raises :class:`TableError` when one is off by more
+        """Compare known answers with the table.  Raise :class:`TableError` if one is off by more
         than its bound."""
         for v, y, expected in ((0.1, 0.5, KNOWN_STICK_SLIP), (2.0, 1.0, KNOWN_CONTINUOUS)):
             mu, bound, _ = self.quantity("mu_ratio", v, y)
@@ -265,10 +269,11 @@ class Surrogate:
     # --- dimensionless ----------------------------------------------------------------------------
 
     def mu_ratio(self, v_tilde: Any, y_tilde: Any) -> Any:
-        """Return mu~ = mu_macro/mu0 [-] of one spring that is shaken across, eq. (15): the fast
-        path.
+        """Return mu~ = mu_macro/mu0 [-] of one spring that is shaken across, eq. (15), in the
+        fastest way.
 
-        Of a ball: ``quantity("mu_ratio", v_tilde, y_tilde, contact="ball")``, with its bound.
+        For a ball use ``quantity("mu_ratio", v_tilde, y_tilde, contact="ball")``, which has the
+        bound.
 
         Parameters
         ----------
@@ -278,12 +283,12 @@ class Surrogate:
         Returns
         -------
         float or ndarray of float64
-            Of the broadcast shape; NaN where a value of an array is out of bounds.
+            In the broadcast shape; NaN where a value of an array is out of bounds.
 
         Raises
         ------
         InputError
-            A scalar out of bounds, something that is no real number, shapes that do not broadcast.
+            If a scalar is out of bounds, a value is not a real number, or shapes do not broadcast.
 
         Examples
         --------
@@ -309,12 +314,12 @@ class Surrogate:
     def v_tilde_crit(
         self, y_tilde: Numbers, *, contact: str = "spring", direction: str = "across"
     ) -> Any:
-        """Return border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude
+        """Return the border of continuous sliding v~crit [-], eqs. (21) to (24), at amplitude
         ``y_tilde`` [-] >= 0.
 
-        Infinite for infinite amplitude.  Relative error below ``border.max_rel_error``.  For a ball
-        all springs slide from there on; along and normal it is the amplitude itself, for normal
-        below 1.
+        It is infinite for an infinite amplitude.  The relative error is below
+        ``border.max_rel_error``.  For a ball it is the speed from which all springs slide.  For
+        along and normal it is the amplitude itself, for normal below 1.
 
         Examples
         --------
@@ -331,26 +336,26 @@ class Surrogate:
         return _reshape(crit, shape)
 
     def power(self, v_tilde: Numbers, y_tilde: Numbers, **kind: str) -> Any:
-        """Return mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega:
-        :meth:`quantity` without bound.
+        """Return the mean power of the shaker <y~ cos tau u_y> [-], in units of mu0 Fz l0 omega.
+        This is :meth:`quantity` without the bound.
 
         Slip turns v~ mu~ plus this power into heat.  An infinite amplitude gives infinite power.
         """
         return self.quantity("power", v_tilde, y_tilde, **kind)[0]
 
     def stick_fraction(self, v_tilde: Numbers, y_tilde: Numbers, **kind: str) -> Any:
-        """Return share of the period during which the contact sticks [-], 0 to 1: :meth:`quantity`
-        without bound."""
+        """Return the fraction of the period during which the contact sticks [-], 0 to 1.  This is
+        :meth:`quantity` without the bound."""
         return self.quantity("stick_fraction", v_tilde, y_tilde, **kind)[0]
 
     def slopes(
         self, v_tilde: Numbers, y_tilde: Numbers, of: str = "mu_ratio", *, bounds: bool = False
     ) -> tuple[Any, ...]:
-        """Return the quantity ``of`` a name as in :meth:`quantity`, and its slopes v~ d/d v~ and y~
-        d/d y~ [-].
+        """Return the quantity with the name ``of``, see :meth:`quantity`, and its derivatives v~
+        d/d v~ and y~ d/d y~ [-].
 
-        With ``bounds`` also those of the two slopes' absolute errors.  Arguments, shapes and errors
-        as in :meth:`mu_ratio`.
+        With ``bounds`` also return the bounds of the absolute errors of the two derivatives.
+        Arguments, shapes and errors are as in :meth:`mu_ratio`.
 
         Examples
         --------
@@ -377,9 +382,9 @@ class Surrogate:
         """Return a tabulated quantity, the bound of its absolute error, and the source code (index
         into SOURCES).
 
-        ``name`` is "mu_ratio", "power" or "stick_fraction"; other arguments, shapes and errors as
-        in :meth:`mu_ratio`.  Of a ball the stick fraction is a share of the load, too; at the
-        border its bound is larger than elsewhere, since there it is a square root of the distance
+        ``name`` is "mu_ratio", "power" or "stick_fraction"; other arguments, shapes and errors are
+        as in :meth:`mu_ratio`.  The stick fraction of a ball is weighted with the load.  At the
+        border its bound is larger than elsewhere, because there it is a square root of the distance
         to v~crit.  For direction "normal" ``y_tilde`` is Fz_amplitude/Fz [-], below 1; it has no
         power, because the model does not know how far the load moves.
 
@@ -488,9 +493,9 @@ class Surrogate:
         Parameters
         ----------
         cases : mapping, DataFrame (pandas, Dask, Polars), pyarrow.Table or xarray.Dataset, optional
-            Inputs and options by name, in place of keywords or beside them.  Another name is
-            refused in a mapping; other columns of a frame, a table or a Dataset are ignored.  One
-            row of a frame, a Series, is one case.
+            Inputs and options by name, instead of keywords or together with them.  An unknown name
+            is refused in a mapping; other columns of a frame, a table or a Dataset are ignored.
+            One row of a frame, a Series, is one case.
         mu0 : array_like
             Coulomb friction coefficient of the contact [-], > 0.
         Fz : array_like
@@ -499,36 +504,36 @@ class Surrogate:
             Tangential stiffness of the contact [N/m], > 0; "rigid" or infinity is rigid contact,
             eq. (37).  It must always be given, here or as an interval: None is refused.
         k_low, k_high : array_like
-            Lowest and highest stiffness [N/m] in place of k.
+            Lowest and highest stiffness [N/m]; they replace k.
         y0 : array_like
             Amplitude of the oscillation, half of peak to peak [m], >= 0, across or along the
             sliding direction.
         Fz_amplitude : array_like
-            Amplitude of the normal force, half of peak to peak, below Fz [N], >= 0, in place of y0
-            where the direction is "normal".
+            Amplitude of the normal force, half of peak to peak, below Fz [N], >= 0; it replaces y0
+            if the direction is "normal".
         omega : array_like
-            Angular frequency of the oscillation [rad/s], >= 0; or
+            Angular frequency of the oscillation [rad/s], >= 0.
         f : array_like
-            Frequency of the oscillation [Hz], >= 0, in its place.
+            Frequency of the oscillation [Hz], >= 0; it replaces omega.
         v0 : array_like
             Sliding speed [m/s], >= 0.
         contact : str
             "spring", one spring; or "ball", a sphere on a flat (Hertz) whose stiffness before slip
-            is k = 8 a G*.  A call has one; a column that holds one value is that value, as is one
-            of directions.
+            is k = 8 a G*.  A call has one contact and one direction; a column of equal values
+            counts as one value.
         direction : str
-            "across" the sliding direction; "along" it, y0 is the amplitude there; or "normal": the
-            force is Fz + Fz_amplitude cos(omega t), for a spring only.
+            "across" or "along" the sliding direction, with the amplitude y0; or "normal": the
+            normal force is Fz + Fz_amplitude cos(omega t), for a spring only.
         include : sequence of str
-            Outputs to compute beside mu_macro, by name: groups, limits, gradient, std,
+            More outputs than mu_macro, by name: groups, limits, gradient, std,
             stick_fraction, power, settling (``mumacro.outputs.OUTPUTS``).  Each is in the
             answer by its path, such as ``answer["power.saved"]``, with its bound.
         std_mu0, std_Fz, std_k, std_y0, std_Fz_amplitude, std_omega, std_f, std_v0 : array_like
-            Standard deviations of the inputs, in their units, of independent errors.  They imply
+            Standard deviations of the inputs, in their units; errors are independent.  They imply
             the output std.
         gradient : bool
-            The same as this name in ``include``: the slopes with respect to every input, with
-            bounds.
+            The same as this name in ``include``: the derivatives with respect to every input,
+            with bounds.
         illegal : str
             Effect of an illegal value in an array: "nan" gives NaN and the source -1 for its case,
             "raise" raises.
@@ -536,15 +541,15 @@ class Surrogate:
         Returns
         -------
         Answer
-            With ``mu_macro_low`` and ``mu_macro_high`` for an interval of k.  Of a frame, a table
-            or a Dataset one of the same kind, with a column for each output by its path; Series
-            give a DataFrame, DataArrays a Dataset, arrays of Dask a dict of lazy ones.
+            For an interval of k with ``mu_macro_low`` and ``mu_macro_high``.  A frame, a table or a
+            Dataset gives a result of the same type, with a column for each output by its path;
+            Series give a DataFrame, DataArrays a Dataset, arrays of Dask a dict of lazy arrays.
 
         Raises
         ------
         InputError
-            A scalar out of bounds; an input that is missing, unknown, given twice or not a number;
-            shapes that do not broadcast; an output that none of the cases has.
+            If a scalar is out of bounds; if an input is missing, unknown, given twice or not a
+            number; if shapes do not broadcast; if no case has an output that was asked for.
 
         Notes
         -----
@@ -579,8 +584,8 @@ class Surrogate:
             and type(illegal) is str
             and illegal == "nan"
         ):
-            # One case across in plain numbers takes this short way, in a third of the time.  What
-            # it cannot answer goes the long way, which has the messages.
+            # One case across in plain numbers takes this short path, in a third of the time.  Cases
+            # that it cannot answer take the long path, which has the messages.
             six = (mu0, Fz, k, y0, omega if f is ABSENT else f, v0)
             types = {*map(type, six)}
             if types <= NUMBERS and not include and not (gradient and k == math.inf):
@@ -588,7 +593,7 @@ class Surrogate:
                     answer = self._one(six, f is not ABSENT, gradient, _SHORT[contact])
                     if answer.source_code >= 0:
                         return answer
-            if types <= _SIMPLE:  # there is nothing else to look for
+            if types <= _SIMPLE:  # no other type has to be looked for
                 fields = FIELDS if f is ABSENT else _SIX_WITH_F
                 of_six = Cases.of(dict(zip(fields, six, strict=True)), _SHORT[contact])
                 return self.answer(of_six, chosen(include, of_six, gradient))
@@ -624,20 +629,20 @@ class Surrogate:
         self, cases: Cases, outputs: tuple[Output, ...] = (), groups: bool = False
     ) -> Answer[Any]:
         """Return :meth:`evaluate` of cases in their one form, with outputs of
-        ``mumacro.outputs.evaluation.chosen``; ``groups`` keeps v~, y~ and l0, too."""
+        ``mumacro.outputs.evaluation.chosen``; ``groups`` adds v~, y~ and l0."""
         answer = evaluation.evaluate_cases(self.tabulated, cases, outputs, groups)
         answer._surrogate = self
         return answer
 
     @staticmethod
     def in_words(answer: Answer[float]) -> tuple[Rows, Rows, str]:
-        """Return the answer to one case as the command prints it, and a notebook shows."""
-        from mumacro.words import of_one_case  # loaded by those alone who show an answer
+        """Return the answer to one case as the command prints it and a notebook shows it."""
+        from mumacro.words import of_one_case  # loaded only if an answer is shown
 
         return of_one_case(answer)
 
     def _one(self, six: tuple[Any, ...], with_f: bool, gradient: bool, kind: Kind) -> Answer[float]:
-        """Return the answer to one case across in plain numbers; NaN where it is illegal."""
+        """Return the answer to one case across in plain numbers, NaN if it is illegal."""
         if with_f:
             six = (*six[:4], RAD_PER_CYCLE * float(six[4]), six[5])
         row = self.tabulated.one(six, gradient, kind.contact)
@@ -660,14 +665,14 @@ class Surrogate:
 
 
 # mu~ at (v~, y~) = (0.1, 0.5) and (2, 1), from the full model to all digits
-# (tests/mumacro/test_surrogate.py solves them anew)
+# (tests/mumacro/test_surrogate.py solves them again)
 KNOWN_STICK_SLIP = 0.9420042895137095
 KNOWN_CONTINUOUS = 0.9545954718694023
 
 
 @functools.cache  # a worker gets the same surrogate with every task
 def _reopen(path: str, checksum: str, threads: int | None, image: bytes | None) -> Surrogate:
-    """Unpickle: from the bytes, or from the bundled table of that name."""
+    """Unpickle a surrogate: from the bytes, or from the bundled table of this name."""
     if image is not None:
         return Surrogate._of_image(image, Path(path), threads)
     surrogate = Surrogate.open(
@@ -682,7 +687,7 @@ def _reopen(path: str, checksum: str, threads: int | None, image: bytes | None) 
 
 
 def _illegal(v: Array, y: Array, bound: str = "finite and >= 0") -> InputError:
-    """Return the error of a single point; ``bound`` is that of y~."""
+    """Return the error of a single point; ``bound`` is the bound of y~."""
     return (
         InputError("y_tilde", float(y[0]), bound)
         if v[0] >= 0.0

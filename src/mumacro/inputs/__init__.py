@@ -1,1 +1,1 @@
-"""A case: inputs by name, unit and bound; contact and direction; an interval of k."""
+"""Read a case: inputs by name, unit and bound; contact and direction; an interval of k."""

@@ -1,8 +1,8 @@
-"""The account of a table: what each of its lines is.
+"""Decide for each line of a table what it is.
 
-A line is before the header, the header, units, data, a comment, a ruler or empty.  What can be none
-of these is refused with its line, and with the option that leaves it out: another header, another
-segment, a row of statistics.
+A line is before the header, the header, units, data, a comment, a ruler or empty.  Any other line
+(another header, another segment, a row of statistics) is refused with its number and with the
+option that leaves it out.
 """
 
 import re
@@ -24,9 +24,9 @@ from mumacro.inputs.column_units import ColumnUnits
 from mumacro.inputs.names import heading
 from mumacro.inputs.units import split_unit
 
-#: what LabVIEW writes behind each of its headers
+#: what LabVIEW writes after each of its headers
 END_OF_HEADER = "***End_of_Header***"
-# what a row of statistics begins with, in small letters
+# first words of a row of statistics, in lower case
 _STATISTICS = re.compile(
     r"(?:mean|average|avg|median|mittel(?:wert)?|mw|moyenne|min(?:imum)?|max(?:imum)?|sum|total"
     r"|summe|range|spannweite|variance|varianz|cov|cv|s\.?d\.?|rsd|count"
@@ -34,44 +34,45 @@ _STATISTICS = re.compile(
     r"|standardabweichung|stabw"
     r"|[ée]cart[ -]type)(?:\.? ?(?:value|wert|of .{1,20}))?\W*"
 )
-#: the first two letters of each of these
+#: the first two letters of each of them
 BEGIN_OF_STATISTICS = frozenset(
     (
         *("me", "av", "mi", "mw", "mo", "ma", "su", "to", "ra"),
         *("sp", "va", "co", "cv", "sd", "rs", "st", "ec", "s."),
     )
 )
-# a line that is drawn between rows has nothing but these signs, and some of them together
+# a line drawn between rows has only these characters, some of them together
 _OF_RULER, _RULER = "-=_+|: \t,;", re.compile(r"-{4}|={3}|\+-{2}|\|:?-{3}")
 
 
 class ColumnNames(NamedTuple):
-    """The columns of a table that mean something."""
+    """Name the columns of a table that have a meaning."""
 
-    input_of: Mapping[str, str]  #: by name, the input whose units it has
-    required_groups: Sequence[Sequence[str]]  #: of each, one name must be there
+    input_of: Mapping[str, str]  #: by name: the input whose units the column has
+    #: of each of these lists, one name must be in the table
+    required_groups: Sequence[Sequence[str]]
 
     def are_all_in(self, heads: Sequence[str]) -> bool:
-        """Return whether heads name all that is needed."""
+        """Return whether the headers contain all necessary names."""
         names = {split_unit(head)[0] for head in heads}
         return all(names.intersection(group) for group in self.required_groups)
 
     def may_be_in(self, text: str) -> bool:
-        """Return whether a text has all names that are needed, as words or within others."""
+        """Return whether a text contains all necessary names, as words or within other words."""
         return all(any(name in text for name in names) for names in self.required_groups)
 
 
 class Header(NamedTuple):
-    """The line with the names of the columns."""
+    """Hold the line with the names of the columns."""
 
     start: int  #: its line, from 0
-    end: int  #: the line behind it
+    end: int  #: the next line after it
     sep: str
     cells: list[str]
 
 
 class Account:
-    """What each line behind the header is."""
+    """Decide what each line after the header is."""
 
     def __init__(
         self,
@@ -85,16 +86,16 @@ class Account:
         self.header, self.units, self._column_names = header, units, column_names
         self._dashes, self._labview = dashes, labview
         self.width = len(units.names)
-        #: what separates the cells of rows, once tabs stand in place of blanks
+        #: separator of the cells in rows, after blanks were replaced by tabs
         self.sep = "\t" if header.sep == BLANKS else header.sep
         # rows of LabVIEW may end before the last column
         self.may_lack_last = labview and units.names[-1:] == ["Comment"]
-        self.first = first  #: the line of the first row, once it is known
-        # every header has this name: looked for first, as most lines lack it
+        self.first = first  #: the line of the first row, when it is known
+        # every header has this name; most lines do not, so it is searched first
         groups = column_names.required_groups
         self.name = max((names[0] for names in groups if len(names) == 1), key=len, default="")
-        self.repeated: list[int] = []  #: lines that have the header or its units again
-        self.skipped: list[int] = []  #: those, comments and rulers
+        self.repeated: list[int] = []  #: lines that repeat the header or its units
+        self.skipped: list[int] = []  #: repeated lines, comments and rulers
 
     def remedy(self, line: int) -> str:
         """Return the remedy for a line that does not belong to the rows."""
@@ -105,10 +106,10 @@ class Account:
         return f"{self._dashes}rows A..B says which lines are data"
 
     def row(self, line: int, text: str) -> tuple[str, str | None] | None:
-        """Return the text of a row, with as many cells as the header, and its fault; None for a
-        line that is no row."""
+        """Return the text of a row, with as many cells as the header, and its fault.  Return None
+        if the line is not a row."""
         width, empty = self.width, self.sep * (self.width - 1)
-        if text.count(self.sep) > 2 * width + 1000 and not is_comment(text):  # not taken apart
+        if text.count(self.sep) > 2 * width + 1000 and not is_comment(text):  # too long to be split
             return empty, irregular(text.count(self.sep) + 1, width)
         if not self.is_row(line, text):
             return None
@@ -122,7 +123,7 @@ class Account:
         return empty, irregular(len(cells), width)
 
     def is_row(self, line: int, text: str) -> bool:
-        """Return whether a line is a row; TextError where it can be nothing at all."""
+        """Return whether a line is a row.  Raise TextError if it has no meaning at all."""
         if not text.strip(f" \t{self.header.sep}"):
             return False
         if self._may_be_header(text) and self._repeats_header(line, text):
@@ -136,7 +137,7 @@ class Account:
             return self._skip(line)
         cells = [cell.strip() for cell in self._cells(text)]
         first = next((cell for cell in cells if cell), "")
-        if not first:  # a blank line with its cells in quotes
+        if not first:  # a blank line whose cells are in quotes
             return False
         if names_statistics(first):
             what = f"{first!r} begins a row of statistics"
@@ -155,15 +156,15 @@ class Account:
         return True
 
     def _holds_values(self, cells: Sequence[str], filled: Sequence[str]) -> bool:
-        """Return whether some of the ``filled`` cells of inputs may be a value; a row without any
-        is one with gaps if it is whole, and more than a title."""
+        """Return whether some of the ``filled`` cells of inputs may be a value.  A row without any
+        value is a row with gaps if it is complete and more than a title."""
         if filled:
             return any(map(may_be_value, filled))
         texts = [*filter(None, cells)]
         return may_be_value(texts[0]) or (len(cells) == self.width and len(texts) > 1)
 
     def _skip(self, line: int, again: bool = False) -> bool:
-        """Account for a line that is no row."""
+        """Account for a line that is not a row."""
         self.skipped.append(line)
         if again:
             self.repeated.append(line)
@@ -176,8 +177,8 @@ class Account:
         return split_row(text, self.sep)
 
     def _is_whole_row(self, text: str) -> bool:
-        """Return whether a line that begins like a comment is a row, whose first cell is a name
-        such as #1."""
+        """Return whether a line that begins like a comment is a row whose first cell is a name such
+        as #1."""
         cells = self._cells(text)
         return (
             0 not in self.units.inputs
@@ -189,14 +190,15 @@ class Account:
         return "leave one of them out" if self.first is None else self.remedy(line)
 
     def _may_be_header(self, text: str) -> bool:
-        """Return whether a text has all names that a header needs, or begins another segment of
+        """Return whether a text has all names that a header needs, or begins a new segment of
         LabVIEW."""
         if self._labview and END_OF_HEADER in text:
             return True
         return self.name in text and self._column_names.may_be_in(text)
 
     def _repeats_header(self, line: int, text: str) -> bool:
-        """Return whether a line is the header again; TextError where it is another one."""
+        """Return whether a line repeats the header.  Raise TextError if it is a different
+        header."""
         if text.startswith(END_OF_HEADER):
             raise TextError(f"line {line} begins another segment: {self.remedy(line)}")
         header, units = self.header, self.units
@@ -216,7 +218,7 @@ class Account:
 
 
 def names_statistics(text: str) -> bool:
-    """Return whether a text is what a row of statistics begins with.
+    """Return whether a text is the first word of a row of statistics.
 
     >>> names_statistics("Std. dev."), names_statistics("motor")
     (True, False)
@@ -225,6 +227,6 @@ def names_statistics(text: str) -> bool:
 
 
 def irregular(count: int, width: int) -> str:
-    """Return what is wrong with a row of so many cells."""
+    """Return what is wrong with a row that has this number of cells."""
     cells = "cell" if count == 1 else "cells"
     return f"has {count:,} {cells}, the header has {width:,}"

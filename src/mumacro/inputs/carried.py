@@ -1,5 +1,6 @@
-"""The unit and the deviation that a value of another library carries, found by what it can do: of
-pint, astropy, unyt, xarray, pandas, h5py, netCDF4 and uncertainties none is imported."""
+"""Read the unit and the deviation of a value from another library (pint, astropy, unyt, xarray,
+pandas, h5py, netCDF4 or uncertainties).  No library is imported: a value is recognised by its
+attributes."""
 
 import math
 from collections.abc import Mapping
@@ -19,30 +20,30 @@ from mumacro.inputs.units import (
     parse_unit,
 )
 
-# of a unit that turns: without one of them 1/s is a frequency, with one of them it is none
+# units of rotation: without one of them 1/s is a frequency, with one of them it is not
 _ANGLES = ("rad", "deg", "°", "turn", "rev", "cycle", "rpm", "arc")
-# whose values never say a unit
+# values of these never have a unit
 _PLAIN = ("builtins", "numpy", "polars", "pyarrow", "dask")
 
 
 def library(value: Any) -> str:
-    """Return the name of the package that the type of a value comes from."""
+    """Return the name of the package that defines the type of a value."""
     return type(value).__module__.partition(".")[0]
 
 
 class Plain(NamedTuple):
-    """What a value that carries a unit holds, and what leads to SI."""
+    """Hold the numbers of a value with a unit, and its scale to SI."""
 
     numbers: Any
     scale: Scale
-    unit: str  #: as the table of units writes it
+    unit: str  #: symbol in the table of units
 
 
 def carried_unit(value: Any) -> Any:
-    """Return the unit that a value carries, an object of its library or a text; None without one.
+    """Return the unit of a value, as an object of its library or a text, or None if it has no unit.
 
-    ``attrs`` of xarray, pandas, h5py and netCDF4 have it by the name ``units`` or ``unit``; those
-    of a frame by the name of the column.
+    ``attrs`` of xarray, pandas, h5py and netCDF4 have it under the name ``units`` or ``unit``;
+    ``attrs`` of a frame have it under the name of the column.
 
     >>> carried_unit(2.0) is None
     True
@@ -51,7 +52,7 @@ def carried_unit(value: Any) -> Any:
     if package in _PLAIN:
         return None
     if package == "pandas":
-        unit = getattr(getattr(value, "dtype", None), "units", None)  # of pint-pandas
+        unit = getattr(getattr(value, "dtype", None), "units", None)  # a type of pint-pandas
     elif package == "xarray":
         unit = _unit_of_quantity(getattr(value, "data", None))
     else:
@@ -60,7 +61,7 @@ def carried_unit(value: Any) -> Any:
         attributes: Any = getattr(value, "attrs", None)
         if hasattr(attributes, "get"):
             unit = attributes.get("units", attributes.get("unit"))
-            if isinstance(unit, Mapping):  # of a frame
+            if isinstance(unit, Mapping):  # the attrs of a frame
                 unit = unit.get(getattr(value, "name", None))
     if isinstance(unit, np.ndarray) and unit.size == 1:
         unit = unit.item()
@@ -81,7 +82,7 @@ def units_of_fields(schema: Any) -> dict[str, str]:
 
 
 def _unit_of_quantity(value: Any) -> Any:
-    """Return the unit of a quantity of pint, astropy, unyt and others like them."""
+    """Return the unit of a quantity of pint, astropy, unyt or a similar library."""
     for attribute in ("units", "unit"):
         unit = getattr(value, attribute, None)
         if unit is not None and not callable(unit) and unit is not value:
@@ -90,7 +91,7 @@ def _unit_of_quantity(value: Any) -> Any:
 
 
 def without_carried_unit(name: str, value: Any, unit: Any, quantity: str) -> Plain:
-    """Return what a value holds whose ``unit`` is that of :func:`carried_unit`.
+    """Return the numbers of a value whose ``unit`` comes from :func:`carried_unit`.
 
     Raise InputError for a unit that the input cannot have.
     """
@@ -105,7 +106,7 @@ def without_carried_unit(name: str, value: Any, unit: Any, quantity: str) -> Pla
 
 
 def scale_of_carried(name: str, unit: Any, quantity: str) -> Scale:
-    """Return the scale of a carried unit, without looking at the numbers.
+    """Return the scale of a unit from :func:`carried_unit`, without reading the numbers.
 
     Raise InputError for a unit that the input cannot have.
     """
@@ -122,10 +123,10 @@ def scale_of_carried(name: str, unit: Any, quantity: str) -> Scale:
 
 
 def labelled_in_si(name: str, column: Any, quantity: str, scale: Scale | None = None) -> Any:
-    """Return an array of xarray or Dask with the same labels and chunks and numbers in SI, still
-    lazy; ``scale`` is that of its header.
+    """Return an array of xarray or Dask with the same labels and chunks, and with numbers in SI; it
+    stays lazy.  ``scale`` is the scale of its header.
 
-    Raise InputError for a unit that the input cannot have, and for two that differ.
+    Raise InputError for a unit that the input cannot have, and for two different units.
     """
     unit = carried_unit(column)
     if unit is not None:
@@ -143,12 +144,12 @@ def labelled_in_si(name: str, column: Any, quantity: str, scale: Scale | None = 
 
 
 def two_units(name: str, unit: str) -> InputError:
-    """Return the error for a column whose header has another unit than its values carry."""
+    """Return the error for a column whose header has another unit than its values."""
     return InputError(name, f"values in {unit}", "in one unit: that of its header is another")
 
 
 def uncertain(value: Any) -> tuple[float, float] | None:
-    """Return value and deviation of a number of the package uncertainties, or of one like it."""
+    """Return value and deviation of a number of the package uncertainties or a similar one."""
     nominal, deviation = (getattr(value, name, None) for name in ("nominal_value", "std_dev"))
     if nominal is None or deviation is None or callable(deviation):
         return None
@@ -156,8 +157,8 @@ def uncertain(value: Any) -> tuple[float, float] | None:
 
 
 def without_mask(value: Any) -> Any:
-    """Return a masked array of NumPy or astropy as a plain one, with NaN or None where it is
-    masked; another value as it is."""
+    """Return a masked array of NumPy or astropy as a plain array, with NaN or None where it is
+    masked.  Return any other value unchanged."""
     if isinstance(value, np.ma.MaskedArray):
         plain, mask = value.data, np.ma.getmaskarray(value)
     elif hasattr(value, "unmasked") and hasattr(value, "mask"):
@@ -180,7 +181,7 @@ def _magnitude(value: Any) -> Any:
 
 
 def _numbers(value: Any) -> Any:
-    """Return what a value that carries a unit holds, without labels and unit."""
+    """Return the numbers of a value with a unit, without labels and unit."""
     package = library(value)
     if package == "pandas":
         array = value.array
@@ -194,7 +195,7 @@ def _numbers(value: Any) -> Any:
 
 
 def _text_of(unit: Any) -> str:
-    """Return a unit as text: short where its library can write it so."""
+    """Return a unit as text, in its short form if the library has one."""
     if isinstance(unit, str):
         return unit
     try:
@@ -204,9 +205,11 @@ def _text_of(unit: Any) -> str:
 
 
 def _converted(value: Any, text: str, unit: str, quantity: str) -> Any:
-    """Return a quantity that its own library has converted to an SI unit; None where it cannot be.
+    """Return a quantity after its own library has converted it to an SI unit, or None if this is
+    impossible.
 
-    For a frequency libraries take a radian, and a turn, as a plain 1: a factor of 2 pi.
+    For a frequency libraries take a radian, and a turn, as a plain 1, which is wrong by a factor of
+    2 pi.
     """
     if not hasattr(value, "to") or is_level(text):
         return None
@@ -235,7 +238,7 @@ def _bound(quantity: str, value: Any, unit: str) -> str:
 
 
 def _shown(value: Any, unit: str) -> str:
-    """Return a quantity in a message."""
+    """Return a quantity as text for a message."""
     try:
         return f"{float(_numbers(value)):.12g} {unit or 'without dimension'}"
     except (TypeError, ValueError):

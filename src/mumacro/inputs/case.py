@@ -1,8 +1,8 @@
-"""One case as a person gives it: a value of one input becomes a number in SI.
+"""Read one case as a person gives it: convert the value of one input to a number in SI.
 
-A number, a text as a person types it, or a value that carries a unit or a deviation.  Keywords,
+A value is a number, a text as a person types it, or a value with a unit or a deviation.  Keywords,
 mappings, command, query, page and JSON of one case are read here; arrays are columns
-(:mod:`mumacro.inputs.columns`).  A value is understood or refused by its name, with the remedy.
+(:mod:`mumacro.inputs.columns`).  A value that is refused is named, with the remedy.
 """
 
 import functools
@@ -25,19 +25,19 @@ from mumacro.inputs.units import (
     parse_unit,
 )
 
-#: types of one real number; a truth value is none
+#: types of one real number, without truth values
 NUMBERS: Final = frozenset((float, int, *(np.dtype(code).type for code in "efdbhilqBHILQ")))
 A_NUMBER = "a real number or an array of them"
-LONGEST = 200  # characters of a value
-#: signs between a value and its deviation
+LONGEST = 200  # limit of the characters of a value
+#: characters between a value and its deviation
 _DEVIATIONS = ("±", "+/-", "+-")
-#: quantities that may be written as the word rigid, and as an interval
+#: quantities that may be the word rigid, or an interval
 OR_RIGID = ("stiffness", "pressure")
 _INTERVAL = "two stiffnesses [N/m] with 0 < low <= high, both finite"
 _IN_RANGE = "at most 1.8e308, the largest number there is"
-_GAPS = ("NAType", "NaTType")  # of pandas, by the name of the type
+_GAPS = ("NAType", "NaTType")  # types of pandas, by name
 _ONE_NUMBER = "one number: k alone may be an interval; ask for both ends, one after the other"
-#: where an answer has no deviation of its own
+#: commands whose answer has no deviation
 NO_DEVIATION = "without a deviation, which only an answer to given cases has"
 _NOT_BOTH = "an interval or a deviation, not both; rigid has neither"
 # a deviation in units of the last digits: 1.00(10) N/um
@@ -46,23 +46,23 @@ _LAST_DIGITS = re.compile(
     re.ASCII,
 )
 _NOT_FINITE = re.compile("[+-]?(inf|infinity|nan)", re.IGNORECASE | re.ASCII)
-# above, a ratio before a deviation in per cent may be meant in per cent, too
+# if a ratio before a deviation in per cent is larger, it may be in per cent, too
 _SURE_RATIO = 1.5
 
 
 class Value(NamedTuple):
-    """What was understood of one input, in SI."""
+    """Hold one input as it was understood, in SI."""
 
-    #: the value, of an interval its geometric middle; infinite where rigid
+    #: the value; for an interval its geometric middle; infinite if rigid
     si: Any
     std: Any = None  #: one standard deviation
     low: Any = None  #: ends of an interval
     high: Any = None
-    text: str | None = None  #: as it came, where it came as a text
-    unit: str | None = None  #: the unit that was understood; None: the number is in SI
+    text: str | None = None  #: the text, if the value was a text
+    unit: str | None = None  #: the unit that was understood; None if the number is in SI
 
     def scaled(self, name: str, scale: Scale, unit: str) -> "Value":
-        """Return the same numbers of an input, meant in a unit."""
+        """Return the same numbers of an input, read in a unit."""
         si, std, low, high = (
             None if part is None else _in_si(name, f"{part!r} {unit}", part, scale)
             for part in self[:4]
@@ -76,17 +76,17 @@ def read(name: str, value: Any, quantity: str = "") -> Value:
     Parameters
     ----------
     name : str
-        Of the input, for messages; :data:`mumacro.inputs.fields.QUANTITY_OF` has what it measures.
+        Name of the input, for messages; :data:`mumacro.inputs.fields.QUANTITY_OF` has its quantity.
     value : number, str, quantity
         A number is in SI, a phase in degrees.  A :class:`Value` has been read before.
     quantity : str
-        What it measures, for a name that is not in the list.
+        Its quantity, for a name that is not in the list.
 
     Raises
     ------
     InputError
-        No value, several, a unit that the input cannot have, a text that may mean two numbers.
-        Bounds are not checked here.
+        If there is no value or more than one, a unit that the input cannot have, or a text that may
+        mean two numbers.  Bounds are not checked here.
 
     Examples
     --------
@@ -128,11 +128,11 @@ def read(name: str, value: Any, quantity: str = "") -> Value:
         return Value(other_number(name, value))
     if array.dtype.kind not in "OU":
         raise InputError(name, value, A_NUMBER)
-    return read(name, inside, quantity)  # of an array without a dimension
+    return read(name, inside, quantity)  # an array without a dimension
 
 
 def _array(name: str, value: Any) -> Any:
-    """Return a value of any type as NumPy sees it."""
+    """Return a value of any type as an array of NumPy."""
     if isinstance(value, (bytes, bytearray, Mapping, set, frozenset)):
         raise InputError(name, value, A_NUMBER)
     try:
@@ -142,15 +142,16 @@ def _array(name: str, value: Any) -> Any:
 
 
 def is_gap(value: Any) -> bool:
-    """Return whether a value says that there is none: None, an empty text, NA and NaT of pandas, a
-    masked entry."""
+    """Return whether a value is a gap: None, an empty text, NA and NaT of pandas, or a masked
+    entry."""
     if value is None or value is np.ma.masked or type(value).__name__ in _GAPS:
         return True
     return isinstance(value, str) and not value.strip()
 
 
 def read_one(name: str, value: Any, quantity: str = "") -> float:
-    """Return one number in SI; InputError as for :func:`read`, and for a deviation or an interval.
+    """Return one number in SI. Raise InputError as :func:`read` does, and also for a deviation or
+    an interval.
 
     >>> read_one("radius", "5mm")
     0.005
@@ -165,7 +166,7 @@ def read_one(name: str, value: Any, quantity: str = "") -> float:
 
 def reason_of(bound: str) -> str:
     """Return the bound of an error as a sentence without its subject."""
-    if bound == STIFFNESS:  # of a gap, in the words of files and JSON
+    if bound == STIFFNESS:  # the bound of a gap, in the words of files and JSON
         return GAP
     return bound if bound.startswith(("is ", "must ")) else f"must be {bound}"
 
@@ -182,8 +183,8 @@ def no_number(name: str, value: object) -> str:
 
 
 def as_double(name: str, value: Any, index: int | None = None) -> float:
-    """Return one number as a double; InputError for one beyond their range, which must not pass
-    for a rigid contact."""
+    """Return one number as a double.  Raise InputError for a number beyond double range, which must
+    not become a rigid contact."""
     try:
         number = float(value)
     except OverflowError:
@@ -194,8 +195,8 @@ def as_double(name: str, value: Any, index: int | None = None) -> float:
 
 
 def other_number(name: str, value: Any, index: int | None = None) -> float:
-    """Return a number of another type, such as Decimal; InputError for truth values, complex
-    numbers and times, which are none."""
+    """Return a number of another type, such as Decimal.  Raise InputError for truth values, complex
+    numbers and times."""
     if isinstance(value, (bool, complex, bytes, np.generic)):
         raise InputError(name, value, A_NUMBER, index)
     try:
@@ -211,7 +212,7 @@ def other_number(name: str, value: Any, index: int | None = None) -> float:
 
 @functools.lru_cache(4096)
 def _of_text(name: str, quantity: str, raw: str) -> Value:
-    """Return a value as a person types it."""
+    """Return a value from the text that a person types."""
     if len(raw) > LONGEST:
         raise InputError(name, f"{raw[:40]}…", "a number, with or without a unit")
     text, quantity = tidy(raw), quantity or quantity_of(name)
@@ -242,8 +243,8 @@ def _of_text(name: str, quantity: str, raw: str) -> Value:
 
 
 def _in_si(name: str, shown: str, number: float, scale: Scale) -> float:
-    """Return a number in SI; InputError for one beyond the doubles: a large stiffness is no rigid
-    contact."""
+    """Return a number in SI. Raise InputError beyond double range, because a large stiffness is not
+    a rigid contact."""
     si = scale.si(number)
     if math.isinf(si) and math.isfinite(number):
         raise InputError(name, shown, "at most 1.8e308 in SI, the largest number there is")
@@ -251,7 +252,7 @@ def _in_si(name: str, shown: str, number: float, scale: Scale) -> float:
 
 
 def _of_no_number(quantity: str, reason: str) -> str:
-    """Return the bound where a text has no number, or may have two."""
+    """Return the bound for a text that has no number, or may mean two numbers."""
     about, reason = QUANTITIES[quantity], reason.removeprefix("must be ")
     if reason != "a number":
         return f"one number: it {reason}" if reason.startswith(("is ", "may ")) else reason
@@ -262,8 +263,8 @@ def _of_no_number(quantity: str, reason: str) -> str:
 def _parse_or_refuse(
     name: str, quantity: str, raw: str, number: float, unit: str
 ) -> tuple[Scale, str | None]:
-    """Return the scale and the symbol of a unit, no symbol where there is none; InputError for one
-    that the quantity cannot have."""
+    """Return the scale and the symbol of a unit (no symbol if there is no unit).  Raise InputError
+    for a unit that the quantity cannot have."""
     if not unit:
         return Scale(), None
     parsed = parse_unit(quantity, unit)
@@ -287,7 +288,7 @@ def _parse_or_refuse(
 
 
 def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) -> Value:
-    """Return ``1 ± 0.1 N/um``, ``1 N/um ± 10 %``, ``1 ± 10 % N/um``, ``(1 ± 0.1) N/um``."""
+    """Read ``1 ± 0.1 N/um``, ``1 N/um ± 10 %``, ``1 ± 10 % N/um`` or ``(1 ± 0.1) N/um``."""
     together, outside = text.startswith("("), ""
     if together:
         inside, _, outside = text[1:].partition(")")
@@ -297,7 +298,7 @@ def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) ->
     deviation, behind = split_number(right.strip())
     if deviation < 0.0 or not math.isfinite(deviation):
         raise InputError(name, raw, "a number and a deviation >= 0")
-    of_both = outside.lstrip().startswith("%")  # of the value, too
+    of_both = outside.lstrip().startswith("%")  # the value is in per cent, too
     if not unit and quantity != "ratio" and behind.startswith("%") and not of_both:
         unit, behind, together = behind[1:].strip(), "%", False
     relative = canonical(behind) == "%" and canonical(unit) != "%" and not together
@@ -315,7 +316,7 @@ def _with_deviation(name: str, quantity: str, raw: str, text: str, mark: str) ->
 
 
 def _interval(name: str, quantity: str, raw: str, text: str) -> Value:
-    """Return ``0.8..1.2 N/um``; a unit behind the second end holds for both."""
+    """Read ``0.8..1.2 N/um``; a unit after the second end holds for both ends."""
     if name != "k":
         raise InputError(name, raw, _ONE_NUMBER)
     left, _, right = text.partition("..")

@@ -1,9 +1,9 @@
-"""Cases in their one form: columns of numbers by name, made once from any form of inputs.
+"""Convert cases to their one form: columns of numbers by name, made once from any form of inputs.
 
 Keywords, a mapping, a data frame, Arrow columns, rows of a file or of JSON become names and values
-(:func:`named`), and these become :class:`Cases`, which alone are evaluated
-(:mod:`mumacro.outputs`).  Labels of pandas, xarray and Dask are taken off and put back by
-:mod:`mumacro.frames`, between the two steps.
+(:func:`named`).  These become :class:`Cases`, the only form that is evaluated
+(:mod:`mumacro.outputs`).  Between the two steps :mod:`mumacro.frames` removes labels of pandas,
+xarray and Dask; afterwards it adds them again.
 """
 
 import enum
@@ -51,8 +51,8 @@ from mumacro.kernel.arrays import Array, Places, flat
 
 
 class Absent(enum.Enum):
-    """The default of an input.  None cannot be it: None is a gap in the data, which is refused for
-    k."""
+    """Define the default of an input.  The default cannot be None, because None is a gap in the
+    data, which is refused for k."""
 
     ABSENT = "left out"
 
@@ -63,52 +63,53 @@ class Absent(enum.Enum):
 ABSENT: Final = Absent.ABSENT
 _UNLABELLED = NUMBERS | {np.ndarray, list, tuple, type(None), dict, str}
 _FLOAT = np.dtype(np.float64)
-#: the fields of all directions
+#: the inputs of all directions
 ALL_FIELDS = (*FIELDS[:4], AMPLITUDE, *FIELDS[4:])
 KIND = ("contact", "direction")
 #: columns of deviations -> the input
 DEVIATIONS = {f"std_{name}": name for name in (*ALL_FIELDS, "f")}
-# the same -> its field, and the value of one unit of the column there
+# columns of deviations -> the field, and the value of one unit of the column there
 _DEVIATION_OF = {column: field_of(name) for column, name in DEVIATIONS.items()}
-#: what a data frame or a file may hold
+#: columns that a data frame or a file may have
 COLUMNS = (*ALL_FIELDS, "f", *ENDS, *KIND, *DEVIATIONS)
-#: what a mapping may hold, too: options of one call
+#: further names that a mapping may have: options of one call
 OPTIONS = ("include", "gradient", "illegal")
 EXACT = "finite and >= 0, 0 where the input is exact"  # the bound of a deviation
-# what stands for one number alone, without a deviation of its own
+# types that are always one number without a deviation
 A_DEVIATION = "one number: the deviation itself"
 AN_END = "one number: an end of the interval"
 
 
 class Cases(NamedTuple):
-    """Cases as they are evaluated, all of one contact and direction."""
+    """Hold cases as they are evaluated, all with the same contact and direction."""
 
     kind: Kind
-    #: by ``kind.fields`` and in their order one number for all cases, or an array (n,); k is
-    #: infinite where rigid, and the geometric middle of an interval
+    #: by ``kind.fields`` and in their order: one number for all cases, or an array (n,); k is
+    #: infinite if rigid, and the geometric middle of an interval
     columns: dict[str, float | Array]
-    #: of the inputs, broadcast: () for one case alone
+    #: broadcast shape of the inputs; () for a single case
     shape: tuple[int, ...]
-    #: lowest and highest k of an interval, as ``columns``
+    #: lowest and highest k of an interval, in the form of ``columns``
     ends: tuple[float | Array, float | Array] | None = None
-    #: standard deviations of inputs, in their units, by name as in ``columns``; without an entry 0
+    #: standard deviations of inputs, in their units, by name as in ``columns``; 0 if there is no
+    #: entry
     std: dict[str, float | Array] = {}  # noqa: RUF012 - never changed
-    #: f [Hz] where it was given in place of omega: messages name what came in
+    #: f [Hz] if it replaced omega: messages name the original input
     f: float | Array | None = None
-    #: units that values carried, by the input as it came in
+    #: units of the values, by the original input
     units: dict[str, str] = {}  # noqa: RUF012 - never changed
-    #: gaps in columns, by the input as it came in and by case
+    #: gaps in columns, by the original input and by case
     faults: Mapping[str, Mapping[int, Fault]] = {}
 
     @classmethod
     def of(
         cls, values: Mapping[str, Any], kind: Kind | None = None, strict: bool = False
     ) -> "Cases":
-        """Return cases from names and values, see :func:`named`; ``kind`` where the values do not
-        tell.
+        """Return cases from names and values, see :func:`named`; ``kind`` is used if the values do
+        not tell it.
 
-        Raise InputError where an input is missing, is no real number, or shapes do not broadcast;
-        for a value out of bounds where ``strict``, and for a case alone.
+        Raise InputError if an input is missing or is not a real number, or if shapes do not
+        broadcast.  If ``strict``, and for a single case, raise it also for a value out of bounds.
 
         >>> inputs = dict(mu0=0.3, Fz=10.0, k="rigid", y0=[1e-6, 2e-6], omega=1e5, v0=0.01)
         >>> cases = Cases.of(inputs)
@@ -142,12 +143,12 @@ class Cases(NamedTuple):
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """The names of the inputs."""
+        """Return the names of the inputs."""
         return self.kind.fields
 
     @property
     def size(self) -> int:
-        """How many cases."""
+        """Return the number of cases."""
         return math.prod(self.shape)
 
     def part(self, which: slice | Places) -> "Cases":
@@ -193,8 +194,8 @@ class Cases(NamedTuple):
         raise AssertionError(f"the case {self.columns} has an answer")
 
     def _with_legal_deviations(self, refuse: bool) -> "Cases":
-        """Return the same with NaN in v0 where a deviation is illegal, so that the case has no
-        answer; where ``refuse``, raise InputError for the first one."""
+        """Return the same cases with NaN in v0 where a deviation is illegal, so that the case has
+        no answer.  If ``refuse``, raise InputError for the first one."""
         if not self.shape and all(0.0 <= float(x) < math.inf for x in self.std.values()):
             return self
         bad = np.zeros(self.size if self.shape else 1, np.bool_)
@@ -214,11 +215,11 @@ class Cases(NamedTuple):
 
 
 def named(cases: Any, keywords: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the inputs and options of ``cases`` and those given by keyword, each once, by name.
+    """Return the inputs and options of ``cases`` and of the keywords, each once, by name.
 
-    Of a mapping every name must be one of :data:`COLUMNS` or :data:`OPTIONS`; of a data frame, an
-    Arrow table or a Dataset other columns are ignored, and refused only where one resembles an
-    input that is missing.  InputError for a name given twice.
+    Every name in a mapping must be in :data:`COLUMNS` or :data:`OPTIONS`.  Other columns of a data
+    frame, an Arrow table or a Dataset are ignored; a column is refused only if it resembles a
+    missing input.  Raise InputError for a name that occurs twice.
 
     >>> named({"mu0": 0.3, "contact": "ball"}, {"k": 1e6})
     {'mu0': 0.3, 'contact': 'ball', 'k': 1000000.0}
@@ -238,10 +239,10 @@ def named(cases: Any, keywords: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def one_word(name: str, column: Any) -> Any:
-    """Return the one word that a column of contacts or directions holds; where it is empty, the
-    usual one.
+    """Return the one word that a column of contacts or directions holds, or the default if the
+    column is empty.
 
-    Raise InputError for several words, with the way to split the cases.
+    Raise InputError for several words, and say how to split the cases.
 
     >>> one_word("contact", ["ball", "ball"])
     'ball'
@@ -254,7 +255,7 @@ def one_word(name: str, column: Any) -> Any:
 
 
 def _select(cases: Any) -> tuple[dict[str, Any], list[str]]:
-    """Return what ``cases`` hold by known names, and the names of the rest."""
+    """Return the values in ``cases`` under known names, and the other names."""
     if isinstance(cases, Mapping) and not library_of(cases):  # a Dataset is a mapping, too
         for name in cases.keys() - {*COLUMNS, *OPTIONS}:
             raise no_such_input(str(name), cases[name])
@@ -264,7 +265,7 @@ def _select(cases: Any) -> tuple[dict[str, Any], list[str]]:
 
 
 def no_such_input(name: str, value: Any, allowed: Iterable[str] = COLUMNS) -> InputError:
-    """Return the error for a name that is none of ``allowed``."""
+    """Return the error for a name that is not in ``allowed``."""
     names = [name for name in allowed if name not in DEVIATIONS]
     if (bound := in_place_of(name, allowed)) is not None:
         return InputError(name, value, bound)
@@ -274,7 +275,7 @@ def no_such_input(name: str, value: Any, allowed: Iterable[str] = COLUMNS) -> In
 
 
 def _refuse_similar(rest: Iterable[str], values: Mapping[str, Any]) -> None:
-    """Refuse a column that resembles an input while that input is missing."""
+    """Refuse a column that resembles an input if this input is missing."""
     present = {*values}
     if present & {*ENDS}:
         present.add("k")
@@ -292,8 +293,8 @@ def _refuse_similar(rest: Iterable[str], values: Mapping[str, Any]) -> None:
 
 
 def select(argument: str, cases: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Return those of ``names`` that a mapping, a data frame or one row of it, an Arrow table or
-    stream, or a Dataset has."""
+    """Return the values of ``names`` in a mapping, a data frame or one row of it, an Arrow table or
+    stream, or a Dataset."""
     return _columns_in(argument, cases, names)[0]
 
 
@@ -305,12 +306,13 @@ def _columns_in(
         cases = cases.to_dict()
     # a stream of batches has no columns by name
     if hasattr(cases, "__arrow_c_stream__") and not hasattr(cases, "__dataframe__"):
-        # its columns come from one reading: a second one may have another order
+        # its columns must come from one read: a second one may have another order
         import pyarrow as pa
 
         cases = pa.table(cases)
     try:
-        if type(cases).__name__ == "LazyFrame":  # of Polars, which warns where its columns are read
+        # Polars warns when the columns of a LazyFrame are read
+        if type(cases).__name__ == "LazyFrame":
             raise TypeError("it has no columns yet")
         # coordinates of a Dataset are inputs, too, although they are not keys; Arrow and Polars
         # have lists of names
@@ -319,7 +321,7 @@ def _columns_in(
             if hasattr(cases, "keys")
             else getattr(cases, "column_names", None) or cases.columns
         )
-        names = dict.fromkeys(names)  # in their order: the first one is named where two are wrong
+        names = dict.fromkeys(names)  # in their order, so that the first wrong name is reported
         heads = {name: [(name, "")] for name in names if name in present}
         for head in present:
             name, unit = split_unit(head) if isinstance(head, str) else (head, None)
@@ -349,8 +351,8 @@ def _columns_in(
 
 
 def library_of(value: Any) -> str:
-    """Return the library whose labels or chunks a value has: pandas, xarray, dask; or nothing, also
-    for an index or one value of pandas."""
+    """Return the library whose labels or chunks a value has: pandas, xarray or dask.  Return an
+    empty text for any other value, also for an index or one value of pandas."""
     name = type(value).__module__.partition(".")[0]
     if name == "pandas":
         return name if hasattr(type(value), "iloc") else ""
@@ -358,17 +360,17 @@ def library_of(value: Any) -> str:
 
 
 def has_labels(values: Iterable[Any]) -> bool:
-    """Return whether the answer is labelled, since an input is."""
+    """Return whether the answer has labels, because an input has them."""
     types = {*map(type, values)}
     return not types <= _UNLABELLED and any(map(library_of, values))
 
 
 def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> dict[str, float]:
-    """Return the inputs of one case beside the unknown or swept one, by the names of
+    """Return the inputs of one case except the unknown or swept one, by the names of
     ``kind.fields``; an infinite ``k`` is rigid.
 
-    ``f`` may stand for ``omega``; inputs that are None are left out.  InputError where one of the
-    five is missing or is not one legal number, and where the unknown has a value.
+    ``f`` may replace ``omega``; inputs that are None are left out.  Raise InputError if one of the
+    five is missing or is not one legal number, or if the unknown has a value.
     """
     if unknown not in kind.columns:
         raise InputError("unknown", unknown, f"one of {', '.join(kind.columns)}")
@@ -402,11 +404,11 @@ def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> 
 
 
 def ends_in(values: Mapping[str, Any], gaps: "_Gaps | None" = None) -> tuple[Any, Any] | None:
-    """Return lowest and highest k, each one number or an array, where an interval is given; the
-    gaps of columns go into ``gaps``.
+    """Return lowest and highest k, each one number or an array, if the values have an interval,
+    otherwise None.  Add the gaps of columns to ``gaps``.
 
-    Raise InputError for one end without the other, for k beside them, and for one pair that is no
-    interval.
+    Raise InputError for one end without the other, for k in addition to both, and for a single pair
+    of ends that are not ordered.
     """
     missing = [name for name in ENDS if name not in values]
     if len(missing) == len(ENDS):
@@ -445,7 +447,7 @@ def is_interval(low: Any, high: Any) -> Any:
 
 
 def middle(low: Any, high: Any) -> float | Array:
-    """Return the geometric middle of intervals, NaN where the ends are not ordered."""
+    """Return the geometric middle of intervals; NaN where the ends are not ordered."""
     if type(low) is float is type(high):
         return min(max(math.sqrt(low) * math.sqrt(high), low), high)
     legal = is_interval(low, high)
@@ -457,10 +459,9 @@ def middle(low: Any, high: Any) -> float | Array:
 def without_interval(
     case: Mapping[str, Any], along: str = ""
 ) -> tuple[Mapping[str, Any], dict[str, Any]]:
-    """Return a case with the middle of an interval of k, and the two ends; no ends where it has one
-    k.
+    """Return a case with the middle of an interval of k, and the two ends; no ends if it has one k.
 
-    InputError for an interval where k itself is swept.
+    Raise InputError for an interval if k itself is swept.
     """
     inputs = {name: value for name, value in case.items() if value is not None or name == "k"}
     ends = ends_in(inputs)
@@ -479,11 +480,11 @@ def without_interval(
 
 
 def columns_of(values: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, float | Array]:
-    """Return the six inputs by the names of ``kind.fields``, each one number or an array of
+    """Return the six inputs by the names of ``kind.fields``, each as one number or an array of
     float64, exact.
 
-    InputError where one is missing, is given twice, is no real number, has a deviation, or is the
-    amplitude of another direction.
+    Raise InputError if an input is missing, occurs twice, is not a real number, has a deviation, or
+    is the amplitude of another direction.
     """
     _refuse_other_amplitude(values, kind)
     for name in values.keys() & DEVIATIONS.keys():
@@ -499,23 +500,23 @@ def columns_of(values: Mapping[str, Any], kind: Kind = SPRING) -> dict[str, floa
 
 
 _Numbers = dict[str, float | Array]
-#: columns with gaps, and their shape, by the input as it came in
+#: columns with gaps, and their shape, by the original input
 _Gaps = dict[str, tuple[Column, tuple[int, ...]]]
 
 
 class _Inputs(NamedTuple):
-    """The inputs as numbers, and what else their values say."""
+    """Hold the inputs as numbers, and their units, deviations and gaps."""
 
     columns: _Numbers
     std: _Numbers
     ends: tuple[Any, Any] | None
     units: dict[str, str]
-    f: float | Array | None  #: where it was given
+    f: float | Array | None  #: the frequency, if it replaced omega
     gaps: _Gaps
 
 
 def _understood(name: str, value: Any, gaps: _Gaps) -> Value:
-    """Return one value, or the numbers of a column, whose gaps go into ``gaps``."""
+    """Return one value, or the numbers of a column; add its gaps to ``gaps``."""
     if type(value) is float:
         return Value(value)
     if type(value) is str or not is_column(value):
@@ -527,8 +528,8 @@ def _understood(name: str, value: Any, gaps: _Gaps) -> Value:
 
 
 def _by_case(gaps: _Gaps, shape: tuple[int, ...], strict: bool) -> dict[str, dict[int, Fault]]:
-    """Return the gaps of columns by the cases that they spoil; InputError for the first, where
-    ``strict``."""
+    """Return the gaps of columns by the cases that they affect.  If ``strict``, raise InputError
+    for the first gap."""
     faults = {}
     for name, (column, of_column) in gaps.items():
         places = np.broadcast_to(np.arange(column.si.size).reshape(of_column), shape).ravel()
@@ -582,8 +583,8 @@ def _inputs(values: Mapping[str, Any], fields: tuple[str, ...]) -> _Inputs:
 def _deviations(
     values: Mapping[str, Any], fields: tuple[str, ...], within: Mapping[str, Any], gaps: _Gaps
 ) -> _Numbers:
-    """Return the deviations that are given beside the values, by field; ``within`` are those that
-    stand in the values themselves, and the gaps of columns go into ``gaps``."""
+    """Return the deviations that are separate inputs, by field.  ``within`` has the deviations in
+    the values themselves.  Add the gaps of columns to ``gaps``."""
     std: _Numbers = {}
     for column in [column for column in DEVIATIONS if column in values]:
         name = DEVIATIONS[column]
@@ -621,14 +622,14 @@ def other_amplitude(name: str, value: Any, kind: Kind) -> InputError:
 
 
 def _check_ends(low: float | Array, high: float | Array, shape: tuple[int, ...]) -> None:
-    """Refuse the first interval of the cases whose ends are not ordered."""
+    """Refuse the first case whose interval has ends that are not ordered."""
     ends = [np.broadcast_to(end, math.prod(shape)) for end in (low, high)]
     for index in np.flatnonzero(~is_interval(*ends) & ~np.isinf(ends[0])).tolist():
         raise no_interval(float(ends[0][index]), float(ends[1][index]), index if shape else None)
 
 
 def _of_all(x: float | Array, shape: tuple[int, ...]) -> float | Array:
-    """Return a column as one number, or flat with one for each case."""
+    """Return a column as one number, or flat with one number for each case."""
     if not isinstance(x, np.ndarray):
         return x
     if x.size == 1:
@@ -637,7 +638,7 @@ def _of_all(x: float | Array, shape: tuple[int, ...]) -> float | Array:
 
 
 def _shape_of(columns: _Numbers, std: _Numbers) -> tuple[int, ...]:
-    """Return the shape to which all columns broadcast; InputError where they do not."""
+    """Return the shape to which all columns broadcast.  Raise InputError if they do not."""
     shapes = {x.shape for x in columns.values() if isinstance(x, np.ndarray)}
     if std:
         shapes |= {x.shape for x in std.values() if isinstance(x, np.ndarray)}
@@ -651,7 +652,7 @@ def _shape_of(columns: _Numbers, std: _Numbers) -> tuple[int, ...]:
 
 
 def _missing(values: Mapping[str, Any], fields: tuple[str, ...]) -> InputError:
-    """Return what to give, where ``values`` lack one or more of the inputs."""
+    """Return the error that says what to give if ``values`` lack inputs."""
     frequency = {name for name in ("omega", "f") if values.get(name) is not None}
     present = {*values} - {"omega"} | ({"omega"} if frequency else set())
     absent = [name for name in fields if name not in present]
@@ -666,15 +667,15 @@ def _missing(values: Mapping[str, Any], fields: tuple[str, ...]) -> InputError:
     return InputError(absent[0], None, bounds[absent[0]] + (rest and f"; so must {rest}"))
 
 
-@np.errstate(over="ignore")  # takes less time than a with statement within
+@np.errstate(over="ignore")  # faster than a with statement in the function
 def _angular(frequency: float | Array) -> float | Array:
-    """Return omega [rad/s] of f [Hz]; beyond double range infinite, which is refused as a value of
-    f."""
+    """Return omega [rad/s] of f [Hz].  Beyond double range it is infinite, which is later refused
+    as a value of f."""
     return frequency * RAD_PER_CYCLE
 
 
 def _frequency_in(values: Mapping[str, Any], fields: tuple[str, ...]) -> str:
-    """Return which of omega and f the values have."""
+    """Return which of omega and f the values contain."""
     if values.get("f") is None:
         if values.get("omega") is None:
             raise _missing(values, fields)
@@ -686,15 +687,16 @@ def _frequency_in(values: Mapping[str, Any], fields: tuple[str, ...]) -> str:
 
 
 def real(name: str, value: Any) -> Array:
-    """Return a value as an array of float64, exact, as :func:`mumacro.inputs.columns.to_si`."""
+    """Return a value as an array of float64, exact, in the way of
+    :func:`mumacro.inputs.columns.to_si`."""
     return np.asarray(to_si(name, value))
 
 
 def check(
     columns: Mapping[str, float | Array], frequency: Any = None, shape: tuple[int, ...] = ()
 ) -> None:
-    """Refuse the first value out of :data:`BOUNDS`; ``frequency`` has the values of ``f`` where
-    it replaced omega, ``shape`` is that of all cases, for the index of the case."""
+    """Refuse the first value out of :data:`BOUNDS`.  ``frequency`` has the values of ``f`` if it
+    replaced omega.  ``shape`` is the shape of all cases, for the index of the case."""
     for name, values in columns.items():
         if type(values) is float and (
             (values > 0.0 or (values == 0.0 and name not in POSITIVE))
@@ -721,7 +723,8 @@ def check(
 
 
 def _first_case(illegal: Any, shape: tuple[int, ...]) -> int | None:
-    """Return the first case with an illegal value; None for one value that is in all cases."""
+    """Return the index of the first case with an illegal value, or None for one value that is in
+    all cases."""
     if not illegal.ndim:
         return None
     cases = np.flatnonzero(np.broadcast_to(illegal, shape or illegal.shape))

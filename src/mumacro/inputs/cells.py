@@ -1,4 +1,4 @@
-"""The cells of a line of text, and the number in a cell."""
+"""Split a line of text into cells, and read the number in a cell."""
 
 import csv
 import io
@@ -13,10 +13,10 @@ from mumacro.inputs.numbers import Signs, read_number, split_number, tidy
 from mumacro.inputs.units import QUANTITIES, Scale, canonical, scale_of
 from mumacro.kernel.arrays import Array
 
-BLANKS = " "  #: the separator where any number of blanks stands between the cells
+BLANKS = " "  #: the separator if any number of blanks separates the cells
 MOST_COLUMNS = 200_000
-COMMENT = ("#", "%", "//", "!")  #: what begins a comment
-#: cells without a value, in small letters
+COMMENT = ("#", "%", "//", "!")  #: first characters of a comment
+#: cells without a value, in lower case
 GAPS = frozenset(
     (
         *("", "-", "--", "---", "—", "–", "−", ".", "..", "...", "?", "*"),
@@ -26,12 +26,13 @@ GAPS = frozenset(
         *("#div/0!", "#value!", "#wert!", "#ref!", "#bezug!", "#num!", "#zahl!", "#name?"),
     )
 )
-#: what says of a column that it has no unit
+#: texts for "this column has no unit"
 NO_UNIT = ("", "-", "1")
-# units of columns that are no inputs
+# units of columns that are not inputs
 _ELSEWHERE = {"s", "ms", "us", "min", "h", "°C", "C", "K", "degC", "V", "mV", "A", "mA", "W", "mW"}
 _OF_TABLE = {unit for quantity in QUANTITIES.values() for unit in quantity.units} - {*NO_UNIT}
-# cells between blanks: quoted, or with blanks within brackets; brackets belong to what is before
+# cells between blanks: in quotes, or with blanks within brackets; brackets belong to the text
+# before them
 _CELL = re.compile(r'"([^"]*)"|((?:[^\s\[\]()"]|\[[^\[\]]*\]|\([^()]*\)|[\[\]()"])+)')
 _WITH_POINTS = str.maketrans(",.", ".?")
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")
@@ -41,12 +42,13 @@ _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")
 
 
 def is_comment(line: str) -> bool:
-    """Return whether a line begins as comments do."""
+    """Return whether a line begins like a comment."""
     return line.lstrip("\ufeff \t").startswith(COMMENT)
 
 
 def uncommented(line: str) -> str:
-    """Return a line without the sign that makes it a comment: the header may be in one."""
+    """Return a line without the characters that make it a comment, because the header may be in a
+    comment."""
     text = line.lstrip("\ufeff ")
     return text.lstrip("#%/!").lstrip() if text.startswith(COMMENT) else text
 
@@ -77,14 +79,14 @@ def split_header(line: str, sep: str) -> list[str]:
 
 
 def split_row(text: str, sep: str) -> list[str]:
-    """Return the cells of a row, as they stand; ``sep`` is a character."""
+    """Return the cells of a row unchanged; ``sep`` is a character."""
     if '"' not in text:
         return text.split(sep)
     return next(csv.reader(io.StringIO(text, newline="\n"), delimiter=sep), [])
 
 
 def joined(cells: Iterable[object], sep: str) -> str:
-    """Return cells as a row of text, those in quotes that need them.
+    """Return cells as a row of text, in quotes where necessary.
 
     >>> joined(["a", "b;c", 1], ";")
     'a;"b;c";1'
@@ -95,7 +97,7 @@ def joined(cells: Iterable[object], sep: str) -> str:
 
 
 def starts_as_number(cell: str) -> bool:
-    """Return whether a cell begins as numbers do."""
+    """Return whether a cell begins like a number."""
     return cell.lstrip("+-−., ")[:1].isdigit()
 
 
@@ -106,7 +108,7 @@ def may_be_value(cell: str) -> bool:
 
 
 def is_unit(text: str) -> bool:
-    """Return whether a text is a unit of anything.
+    """Return whether a text is a unit of any quantity.
 
     >>> [is_unit(text) for text in ("mm/s", "-", "°C", "speed")]
     [True, True, True, False]
@@ -120,10 +122,10 @@ def is_unit(text: str) -> bool:
 
 
 def read_cell(name: str, cell: str, signs: Signs, scale: Scale = Scale()) -> float:  # noqa: B008
-    """Return the number in a cell of a column, in the unit of the column; NaN for a gap.
+    """Return the number in a cell of a column, in the unit of the column, or NaN for a gap.
 
-    ``name`` is the input that the column has the units of, ``scale`` that of its unit.  Raise
-    ValueError, which says what is wrong.
+    ``name`` is the input whose units the column has, ``scale`` the scale of its unit.  Raise
+    ValueError with the fault.
 
     >>> german = Signs(",", None)
     >>> read_cell("v0", "1.000,5", german), read_cell("k", "Rigid", german)
@@ -140,7 +142,7 @@ def read_cell(name: str, cell: str, signs: Signs, scale: Scale = Scale()) -> flo
     except ValueError as error:
         if name == "k" and text.lower() == RIGID:
             return math.inf
-        if text[-1:] in "%‰" and QUANTITY_OF[name] == "ratio":  # a number, whatever the unit
+        if text[-1:] in "%‰" and QUANTITY_OF[name] == "ratio":  # a number, whatever the unit is
             number = read_number(text[:-1].strip(), signs.decimal)
             return number * scale.over / (scale.times * (100.0 if text[-1] == "%" else 1e3))
         raise ValueError(_no_number(name, text, str(error), signs)) from None
@@ -155,7 +157,7 @@ def _no_number(name: str, text: str, fault: str, signs: Signs) -> str:
             return "must be one number; its ends are columns k_low and k_high, a deviation std_k"
         return "must be one number; a deviation is a column std"
     if not text.strip("0123456789.,'’+-−eEdD \u00a0\u202f"):
-        return fault  # such as a sign that is not the decimal one
+        return fault  # such as a separator that is not the decimal one
     try:
         _, unit = split_number(signs.with_points(tidy(text)))
     except ValueError:
@@ -171,8 +173,8 @@ def numbers_of(
     signs: Signs,
     scale: Scale = Scale(),  # noqa: B008
 ) -> tuple[Array, dict[int, str]]:
-    """Return the numbers in the cells of a column in its unit, NaN for a gap, and what is wrong
-    with a cell, by its index; see :func:`read_cell`.
+    """Return the numbers in the cells of a column in its unit (NaN for a gap), and the faults by
+    the index of the cell; see :func:`read_cell`.
 
     >>> numbers_of(["1,5", "-", "x"], "v0", Signs(",", None))
     (array([1.5, nan, nan]), {2: 'must be a number'})
@@ -180,7 +182,7 @@ def numbers_of(
     texts = [cell or "" for cell in cells]
     values, faults = np.full(len(texts), math.nan), dict[int, str]()
     for i, text in enumerate(texts):
-        # where commas are decimal, a point is none
+        # if commas are decimal separators, a point is not
         plain = text.translate(_WITH_POINTS) if signs.decimal == "," else text
         try:
             value = float(_FORTRAN.sub("e", plain) if "D" in plain or "d" in plain else plain)

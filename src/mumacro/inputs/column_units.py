@@ -1,6 +1,6 @@
-"""The units of the columns of a table, from every line that says some.
+"""Find the units of the columns of a table, from every line that has some.
 
-Units stand with the names, in a row beside them (above, below, in a comment), or in a legend such
+Units are next to the names, in a row of their own (above, below, in a comment), or in a legend such
 as ``# v0: speed [mm/s]``.  A unit that belongs to no column, or that contradicts another one, is
 refused with its line.
 """
@@ -29,7 +29,7 @@ _LONGEST = 20  # characters of a unit
 _LABEL = re.compile(r"(?:units?|einheit(?:en)?|unités?|[a-z]+_units)\W*", re.IGNORECASE)
 _LABEL_BEFORE = re.compile(r"(?:units?|einheit(?:en)?|unités?)\s*[:=]\s*", re.IGNORECASE)
 _BETWEEN_BLANKS = re.compile(r"\[[^\[\]]*\]|\([^()]*\)|\S+")  # a unit
-# of a legend, behind the name of a column
+# of a legend, after the name of a column
 _BRACKET = re.compile(r"\s*(?:[:=]\s*)?([\[(])([^\[\]()]{0,40})[\])]")
 _LAST_BRACKET = re.compile(r"([\[(])([^\[\]()]{0,40})[\])][\s.;,]*$")
 _LAST_WORD = re.compile(r"(?:\bin|[,:=])\s+(\S{1,20})$")
@@ -48,9 +48,9 @@ _ECSV_NAME, _ECSV_UNIT = (
 
 
 class ColumnUnits:
-    """The columns of a table: their names, and their units as far as lines have said them.
+    """Hold the columns of a table: their names, and the units that lines have given so far.
 
-    Once rows have begun, a column without a unit is in SI.
+    After the first row, a column without a unit is in SI.
     """
 
     def __init__(self, cells: Sequence[str], sep: str, input_of: Mapping[str, str]) -> None:
@@ -58,18 +58,18 @@ class ColumnUnits:
         self._heads = [heading(cell, input_of) for cell in cells]
         in_header = [split_unit(head) for head in self._heads]
         self.names = [name for name, _ in in_header]
-        #: by place, the columns that mean something
+        #: by index: the columns that have a meaning
         self.inputs = {i: name for i, name in enumerate(self.names) if name in input_of}
-        # by place: the unit, and its line, if it is not that of the header
+        # by index: the unit, and its line if it is not in the header
         self._units: dict[int, tuple[str, int | None]] = {
             i: (unit, None) for i, (_, unit) in enumerate(in_header) if unit is not None
         }
-        self.lines: set[int] = set()  #: those that say units, from 1
+        self.lines: set[int] = set()  #: lines with units, from 1
         self.rows_begun = False
 
     @property
     def heads(self) -> list[str]:
-        """The names of the columns, with their units in brackets."""
+        """Return the names of the columns, with their units in brackets."""
         return [
             f"{head} [{self._units[i][0]}]"
             if self._units.get(i, ("", None))[1] is not None and self._units[i][0]
@@ -82,18 +82,19 @@ class ColumnUnits:
         return self._units.get(i, ("", None))[0] or unit_of(self.names[i])
 
     def agrees(self, i: int, unit: str | None) -> bool:
-        """Return whether a unit is that of an input's column; None is that of SI."""
+        """Return whether a unit is the unit of an input's column; None stands for the SI unit."""
         return self._scale(i, unit or "") == self._scale(i, self._units.get(i, ("", None))[0])
 
     def _scale(self, i: int, unit: str) -> Scale:
         return scale_of(self._input_of[self.names[i]], unit) or SI_UNIT
 
     def take(self, line: int, text: str, remedy: str = _LEAVE_ONE) -> bool:
-        """Take the units that a line says, as a row or as a legend; return whether it says any."""
+        """Take the units in a line, either a row of units or a legend.  Return whether the line has
+        units."""
         return self.take_row(line, text, remedy) or self.take_legend(line, text, remedy)
 
     def take_legend(self, line: int, text: str, remedy: str = _LEAVE_ONE) -> bool:
-        """Take the units behind the names of columns in a line; return whether there are some."""
+        """Take the units after the names of columns in a line.  Return whether there are any."""
         legend = [*units_in_legend(text, [*self.inputs.values()])]
         for name, unit in legend:
             self._take_one(line, self.names.index(name), unit, remedy)
@@ -104,23 +105,24 @@ class ColumnUnits:
     def take_row(
         self, line: int, text: str, remedy: str = _LEAVE_ONE, is_no_row: bool = False
     ) -> bool:
-        """Take the units of a line that has nothing else; return whether it is one.
+        """Take the units of a line that contains only units.  Return whether it is such a line.
 
-        Where the line ``is_no_row`` and no comment, columns that are no inputs may hold any text.
+        If ``is_no_row`` is true for the line and it is not a comment, columns that are not inputs
+        may hold any text.
         """
         units = self._cells_of_units(line, text, is_no_row)
         self.take_cells(line, units or [], remedy)
         return units is not None
 
     def take_cells(self, line: int, units: Sequence[str], remedy: str = _LEAVE_ONE) -> None:
-        """Take the unit of each column; nothing where it is empty."""
+        """Take the unit of each column; skip an empty one."""
         for i, unit in enumerate(units[: len(self.names)]):
             if unit:
                 self._take_one(line, i, unit, remedy)
 
     def _cells_of_units(self, line: int, text: str, is_no_row: bool) -> list[str] | None:
-        """Return the units in a line that has nothing else; None for another line; TextError where
-        they belong to no column."""
+        """Return the units in a line that contains only units, or None for another line.  Raise
+        TextError if they belong to no column."""
         if len(text) > 100_000:
             return None
         bare = uncommented(text)
@@ -161,7 +163,7 @@ class ColumnUnits:
         return None
 
     def _take_one(self, line: int, i: int, unit: str, remedy: str) -> None:
-        """Take the unit of a column."""
+        """Take the unit of one column."""
         name, before = self.names[i], self._units.get(i)
         if name in self._input_of:
             if unit in NO_UNIT and before is not None:
@@ -183,8 +185,8 @@ class ColumnUnits:
             self.lines.add(line)
 
     def _refuse_of_another_name(self, line: int, text: str) -> None:
-        """Refuse a line that has a unit, other than that of SI, for something that may be a column
-        whose unit is not known."""
+        """Refuse a line with a unit (other than SI) for something that may be a column whose unit
+        is unknown."""
         match = _OF_ANOTHER_NAME.fullmatch(" ".join(text[:100].split()))
         if match is None:
             return
@@ -200,7 +202,7 @@ class ColumnUnits:
                 )
 
     def take_ecsv(self, lines: Sequence[str]) -> None:
-        """Take the units of the columns that the comments of an ECSV file have, as YAML."""
+        """Take the units of the columns from the comments of an ECSV file, which are YAML."""
         text, starts = "", list[tuple[int, int]]()
         for number, line in enumerate(lines, 1):
             if is_comment(line):
@@ -215,7 +217,7 @@ class ColumnUnits:
 
 
 def units_in_legend(line: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Yield the names of columns and their units in a line such as ``# v0: speed [mm/s]``.
+    """Yield the names of columns and their units from a line such as ``# v0: speed [mm/s]``.
 
     >>> [*units_in_legend("# v0: sliding speed [mm/s], mu_macro in %", ["v0", "mu_macro"])]
     [('v0', 'mm/s'), ('mu_macro', '%')]
@@ -225,7 +227,7 @@ def units_in_legend(line: str, names: Sequence[str]) -> Iterator[tuple[str, str]
     if len(line) > 2_000 or not any(name in line for name in names):
         return
     first, *cells = _BETWEEN_CELLS.split(uncommented(line))
-    if first.strip(" \"'") in names:  # a line for each column, with cells of its own
+    if first.strip(" \"'") in names:  # a line for each column, with its own cells
         texts = [cell.strip(" []()\"'") for cell in cells]
         numbers = [i for i, text in enumerate(texts) if starts_as_number(text)]
         units = [text for text in texts[: min(numbers, default=None)] if is_unit(text)]
@@ -241,7 +243,7 @@ def units_in_legend(line: str, names: Sequence[str]) -> Iterator[tuple[str, str]
 
 
 def _places_of_names(line: str, names: Sequence[str]) -> Iterator[tuple[int, str]]:
-    """Yield where a name stands as a word in a line, the longest where several do.
+    """Yield where a name occurs as a word in a line; if several names do, the longest.
 
     >>> [*_places_of_names("v0 and v0_set, mu.v0", ["v0", "v0_set"])]
     [(0, 'v0'), (7, 'v0_set')]
@@ -258,7 +260,7 @@ def _places_of_names(line: str, names: Sequence[str]) -> Iterator[tuple[int, str
 
 
 def _unit_in_legend(behind: str) -> str | None:
-    """Return the unit in what stands behind a name; None where there is none."""
+    """Return the unit in the text after a name, or None if there is none."""
     match = _BRACKET.match(behind)
     if match is None:
         if _A_NUMBER.search(behind):  # a value, or a range of values

@@ -1,8 +1,8 @@
-"""Columns of a program: arrays of any library become float64 in SI.
+"""Convert columns of a program, arrays of any library, to float64 in SI.
 
-A column holds numbers, and its unit belongs to all of it: the unit of a quantity array, one that
-its container says, or that of its header.  A text or None among numbers is a gap, whose reason is
-kept; a column of texts alone is refused, and so are complex numbers, times and truth values.
+A column holds numbers, and one unit belongs to the whole column: the unit of a quantity array, of
+its container, or of its header.  A text or None among numbers is a gap, and its reason is kept.  A
+column of texts only is refused, and so are complex numbers, times and truth values.
 """
 
 import math
@@ -39,30 +39,30 @@ from mumacro.inputs.units import QUANTITIES, in_si, parse_unit, scale_of, too_la
 from mumacro.kernel.arrays import Array
 
 _FLOAT = np.dtype(np.float64)
-_REAL = "fiu"  # kinds of arrays of real numbers
+_REAL = "fiu"  # kinds of arrays of real numbers in NumPy
 _NO_NUMBERS = {"b": "truth values", "c": "complex numbers", "M": "times", "m": "durations"}
 _NO_ARRAY = (str, bytes, bytearray, Mapping, set, frozenset, type)
 NOT_TEXT = "must be a number, not a text"
 
 
 class Fault(NamedTuple):
-    """Why an entry of a column has no number: the entry, and the reason as a sentence without its
-    subject."""
+    """Tell why an entry of a column has no number: the entry, and the reason as a sentence without
+    its subject."""
 
     entry: object
     reason: str
 
 
 class Column(NamedTuple):
-    """A column as it was understood."""
+    """Hold a column as it was understood."""
 
-    si: Array  #: in the shape of the column, NaN at gaps; infinite where a contact is rigid
-    unit: str | None = None  #: that was understood; None: the numbers are in SI
-    faults: Mapping[int, Fault] = {}  #: by place in the flattened column
+    si: Array  #: in the shape of the column, NaN at gaps; infinite if a contact is rigid
+    unit: str | None = None  #: the unit that was understood; None if the numbers are in SI
+    faults: Mapping[int, Fault] = {}  #: by index in the flattened column
 
 
 def is_column(value: Any) -> bool:
-    """Return whether a value is an array of some library, a list or a tuple: not one value alone.
+    """Return whether a value is an array of any library, a list or a tuple, and not a single value.
 
     >>> is_column([1.0]), is_column(np.float64(1.0)), is_column("1"), is_column(np.array(1.0))
     (True, False, False, False)
@@ -88,18 +88,19 @@ def read_column(name: str, values: Any, quantity: str = "", unit: str = "") -> C
     Parameters
     ----------
     name : str
-        Of the input, for messages; :data:`mumacro.inputs.fields.QUANTITY_OF` has what it measures.
+        Name of the input, for messages; :data:`mumacro.inputs.fields.QUANTITY_OF` has its quantity.
     values : array_like
         An array of doubles is not copied.  A :class:`Column` has been read before.
     quantity : str
-        What it measures, for a name that is not in the list.
+        Its quantity, for a name that is not in the list.
     unit : str
-        That of its header or field.
+        The unit in its header or field.
 
     Raises
     ------
     InputError
-        A column of texts alone, of what is no real number, in a unit that the input cannot have.
+        If the column has only texts, values that are not real numbers, or a unit that the input
+        cannot have.
 
     Examples
     --------
@@ -215,13 +216,14 @@ def _doubles(name: str, values: Any, quantity: str) -> tuple[Array, dict[int, Fa
 
 
 def _array(name: str, values: Any) -> Any:
-    """Return an array of NumPy of a container."""
+    """Return a container as an array of NumPy."""
     package = library(values)
     if package == "pandas":
         if hasattr(values, "columns"):
             raise InputError(name, "a DataFrame", f"{A_NUMBER}: one column of it")
         dtype = values.dtype
-        if dtype.kind in _REAL and not isinstance(dtype, np.dtype):  # with NA in place of NaN
+        # such a type has NA instead of NaN
+        if dtype.kind in _REAL and not isinstance(dtype, np.dtype):
             return values.to_numpy(np.float64, na_value=math.nan)
     elif package == "netCDF4" or (hasattr(values, "attrs") and package != "xarray"):
         return without_mask(values[...])  # an array in a file
@@ -232,7 +234,8 @@ def _array(name: str, values: Any) -> Any:
 
 
 def as_doubles(name: str, array: Any) -> Array:
-    """Return an array of real numbers as doubles; InputError for one beyond their range."""
+    """Return an array of real numbers as doubles.  Raise InputError for a number beyond double
+    range."""
     with np.errstate(over="ignore"):
         doubles: Array = array.astype(np.float64, copy=False)
     if array.dtype.itemsize > doubles.dtype.itemsize:
@@ -244,8 +247,8 @@ def as_doubles(name: str, array: Any) -> Array:
 
 
 def _entries(name: str, value: Sequence[Any]) -> tuple[tuple[int, ...], list[Any]]:
-    """Return shape and entries of nested lists; InputError for lists of several lengths, and for an
-    array with a unit within a list."""
+    """Return shape and entries of nested lists.  Raise InputError for lists of different lengths,
+    and for an array with a unit within a list."""
     if not any(map(_is_row, value)):
         return (len(value),), list(value)
     try:
@@ -261,7 +264,7 @@ def _entries(name: str, value: Sequence[Any]) -> tuple[tuple[int, ...], list[Any
 
 
 def _is_row(value: Any) -> bool:
-    """Return whether an entry of a list is a list or an array itself."""
+    """Return whether an entry of a list is itself a list or an array."""
     if isinstance(value, (list, tuple)):
         return True
     dimensions = getattr(value, "ndim", 0)
@@ -271,7 +274,7 @@ def _is_row(value: Any) -> bool:
 def _of_entries(
     name: str, values: Any, entries: Sequence[Any], shape: tuple[int, ...], quantity: str
 ) -> tuple[Array, dict[int, Fault]]:
-    """Return entries of several types, one after the other."""
+    """Return the numbers of entries of several types, read one after the other, and their gaps."""
     si, faults = np.full(len(entries), math.nan), dict[int, Fault]()
     or_rigid = quantity in OR_RIGID and not name.startswith("std_")
     numbers = texts = 0
@@ -303,7 +306,7 @@ def _of_entries(
 
 
 def _number(name: str, entry: Any, index: int) -> float:
-    """Return a number of another type, such as Decimal; InputError for what is none."""
+    """Return a number of another type, such as Decimal.  Raise InputError for anything else."""
     if carried_unit(entry) is not None:
         bound = "numbers: the unit belongs to the whole column, as that of a quantity array"
         raise InputError(name, entry, bound, index)

@@ -1,9 +1,10 @@
-"""A text file as lines: its encoding, its line ends, and what is no text at all.
+"""Split a text file into lines: find its encoding and its line ends, and refuse a file that is not
+a text.
 
-The encoding is the given one, else that of the byte order mark, else UTF-8, else Windows-1252: a
-file without a mark is Windows-1252 from the first byte on that is not UTF-8, as long as all before
-is ASCII, which is the same in both.  Lines end as an editor shows them: at a line feed, a carriage
-return, or both.
+The encoding is the one that the caller names, or else that of the byte order mark, or else UTF-8,
+or else Windows-1252.  A file without a mark is Windows-1252 from the first byte that is not UTF-8,
+if everything before it is ASCII, which is the same in both.  Lines end as in an editor: at a line
+feed, a carriage return, or both.
 """
 
 import codecs
@@ -18,8 +19,8 @@ from typing import Any, NamedTuple
 from mumacro.errors import TextError
 
 PIECE = 4 * 2**20  #: bytes that are read at once
-LONGEST = 16 * 2**20  #: characters of a line, at most
-_START = 1024  # bytes from which the encoding is decided
+LONGEST = 16 * 2**20  #: largest number of characters in a line
+_START = 1024  # number of bytes from which the encoding is decided
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF32_LE, "utf-32"),
@@ -27,7 +28,7 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-# files that are no tables as text, by their first bytes
+# files that are not tables as text, by their first bytes
 _OTHERS = (
     (b"PK\x03\x04", "is a workbook (.xlsx) or another zip file; save its table as CSV"),
     (b"\xd0\xcf\x11\xe0", "is a workbook of old Excel (.xls); save it as .xlsx or as CSV"),
@@ -44,31 +45,31 @@ _OTHERS = (
     (b"<", "is HTML or XML; save it as CSV"),
 )
 _JSON = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:\{\s*[\"}]|\[\s*[\[{\"]|\[\s*-?\d[\d.eE+-]*\s*,)")
-# the encodings that are read: without those of Python that are not for texts, or are slow
+# the encodings that are read, without those of Python that are not for texts, or are slow
 _ENCODING = re.compile(
     r"ascii|big5\w*|cp\w+|euc\w+|gb\w+|hp_roman8|iso8859\w+|johab|koi8\w+|latin\w+|mac\w+"
     r"|ptcp154|shift\w+|tis_620|utf_(?:8|8_sig|16|16_le|16_be|32|32_le|32_be)"
 )
-#: encodings as people call them
+#: names of encodings that people use
 NAMES = {"utf-8": "UTF-8", "utf-8-sig": "UTF-8", "utf-16": "UTF-16", "utf-32": "UTF-32"}
 NAMES |= {"utf-16-le": "UTF-16", "utf-16-be": "UTF-16", "cp1252": "Windows-1252"}
 
 
 class Piece(NamedTuple):
-    """Whole lines of a text."""
+    """Hold complete lines of a text."""
 
-    first: int  #: the number of the first one, from 1
-    text: str  #: with a line feed between two lines
+    first: int  #: the number of the first line, from 1
+    text: str  #: the lines, with a line feed between two of them
 
     @property
     def lines(self) -> list[str]:
-        """The lines without their ends."""
+        """Return the lines without their ends."""
         return self.text.split("\n")
 
 
 def encoding_of(name: str) -> str:
-    """Return the encoding that a person names, as Python calls it; TextError where there is none of
-    this name.
+    """Return Python's name of the encoding that a person names.  Raise TextError if there is no
+    such encoding.
 
     >>> encoding_of("Windows-1252"), encoding_of("UTF8")
     ('cp1252', 'utf-8')
@@ -87,8 +88,8 @@ def encoding_of(name: str) -> str:
 def file_pieces(
     path: Path, report_place: Callable[[int], None] = lambda _place: None
 ) -> Iterator[bytes]:
-    """Yield the bytes of a file in pieces, also of a compressed one (.gz); ``report_place`` is told
-    how far the file is read. TextError where a compressed one is damaged."""
+    """Yield the bytes of a file in pieces, also of a compressed file (.gz).  Tell ``report_place``
+    how far the file has been read.  Raise TextError if a compressed file is damaged."""
     try:
         with path.open("rb") as raw:
             stream: Any = gzip.GzipFile(fileobj=raw) if path.name.lower().endswith(".gz") else raw
@@ -100,10 +101,10 @@ def file_pieces(
 
 
 class Text:
-    """The lines of a text in pieces, from pieces of its bytes.
+    """Split pieces of bytes into pieces of complete lines.
 
-    Memory holds a piece and a line.  TextError names the line of bytes that are no text of the
-    encoding, of a zero byte, and of a line that is too long.
+    Memory holds a piece and a line.  TextError names the line with bytes that are not text in the
+    encoding, with a zero byte, or with too many characters.
 
     >>> [piece.lines for piece in Text([b"a\\rb\\r", b"\\nc"])]
     [['a', 'b'], ['c']]
@@ -111,11 +112,11 @@ class Text:
 
     def __init__(self, pieces: Iterable[bytes], encoding: str | None = None) -> None:
         self._codec_of_caller = None if encoding is None else encoding_of(encoding)
-        self.encoding = ""  #: as Python calls it; known from the first piece on
+        self.encoding = ""  #: Python's name, known after the first piece
         self._bytes = _with_start(pieces)
-        self._lines = 0  # that are whole
-        self._begun: list[str] = []  # of the next line
-        self._ascii = True  # so far
+        self._lines = 0  # number of complete lines
+        self._begun: list[str] = []  # the beginning of the next line
+        self._ascii = True  # whether all bytes so far are ASCII
         self._decoder: codecs.IncrementalDecoder | None = None
         self._line_ends = io.IncrementalNewlineDecoder(None, translate=True)
 
@@ -140,13 +141,13 @@ class Text:
         return self._piece(last.removesuffix("\n"))
 
     def _piece(self, text: str) -> Piece:
-        """Return the next lines, which are whole."""
+        """Return the next complete lines."""
         first = self._lines + 1
         self._lines += text.count("\n") + 1
         return Piece(first, text)
 
     def _decoded(self, data: bytes, final: bool = False) -> str:
-        """Return the text of some bytes, whose lines end in line feeds."""
+        """Return the text of some bytes, with line feeds as line ends."""
         if self._decoder is None:
             self._decoder = self._begin(data)
         try:
@@ -161,8 +162,8 @@ class Text:
         return text
 
     def _begin(self, data: bytes) -> codecs.IncrementalDecoder:
-        """Return the decoder for the first bytes, which tell the encoding; what is no text is
-        refused."""
+        """Return the decoder for the first bytes, which show the encoding.  Refuse a file that is
+        not a text."""
         for begin, what in _OTHERS:
             if data.startswith(begin):
                 raise TextError(f"it {what}")
@@ -199,7 +200,7 @@ class Text:
 
 
 def _with_start(pieces: Iterable[bytes]) -> Iterator[bytes]:
-    """Yield the pieces, the first of them long enough to know the encoding by."""
+    """Yield the pieces; make the first one long enough to show the encoding."""
     start = b""
     for piece in (rest := iter(pieces)):
         start += piece
@@ -210,7 +211,8 @@ def _with_start(pieces: Iterable[bytes]) -> Iterator[bytes]:
 
 
 def _of_zeros(data: bytes) -> str | None:
-    """Return the encoding of two bytes a character, where every other byte is mostly zero."""
+    """Return the encoding with two bytes for each character, if every second byte is mostly
+    zero."""
     half = len(data) // 2
     low, high = data[::2].count(0), data[1::2].count(0)
     if half < 2 or max(low, high) < 0.7 * half or min(low, high) > 0.1 * half:

@@ -1,9 +1,9 @@
-"""What is probably a wrong unit or a wrong order of magnitude: remarks beside an answer, for one
+"""Write remarks on inputs that probably have a wrong unit or a wrong order of magnitude, for one
 case and for many.
 
-A value outside its usual range (:attr:`mumacro.inputs.fields.Field.usual`) is answered and remarked
-on, never refused; so is a contact whose length l0 = mu0 Fz / k, whose groups v~ and y~ or whose
-peak speed y0 omega no contact has.  A rigid contact is answered with what it assumes.
+A value outside its usual range (:attr:`mumacro.inputs.fields.Field.usual`) is answered with a
+remark, never refused.  The same holds for a length l0 = mu0 Fz / k, a v~ or y~, or a peak speed y0
+omega that no contact has.  A rigid contact is answered with its assumption.
 """
 
 import math
@@ -19,11 +19,11 @@ from mumacro.kernel.arrays import Array, Bools
 from mumacro.notes import REMARK, Note
 
 UNITS, STIFFNESS = "units", "k is known"  # rows of docs/validity.md
-MODEL = "model"  # the row of a case for which no model is needed
+MODEL = "model"  # the row of a case that needs no model
 LONGEST = 1e-2  # l0 [m]; no contact has more
 FURTHEST = 1e4  # v~ and y~; no contact has more
-# y0 omega [m/s]: a resonant bar of titanium yields at about 40, stress over density and speed of
-# sound
+# y0 omega [m/s]: a resonant bar of titanium yields at about 40 (stress over density and speed of
+# sound), shaken contacts have less
 FASTEST = 100.0
 # shaken contacts have less
 _LARGE = {"k": 1e9, "y0": 1e-4, "v0": 1.0, "omega": 1e6}
@@ -38,20 +38,20 @@ def remarks(
     units: Mapping[str, str] | None = None,
     names: Mapping[str, str] | None = None,
 ) -> list[Note]:
-    """Return the remarks on cases, at most one for each input, and those on contacts that are not
-    shaken, or rigid.
+    """Return the remarks on cases, at most one for each input, and remarks on contacts that are not
+    shaken, or are rigid.
 
     Parameters
     ----------
     columns : mapping
-        The six inputs in SI by name, numbers or arrays that broadcast; an input that a case does
-        not have, such as y0 of one whose normal force oscillates, is left out, or NaN there.
+        The six inputs in SI by name, numbers or arrays that broadcast.  An input that a case does
+        not have, such as y0 if the normal force oscillates, is left out, or NaN.
     frequency : bool
-        Whether the inputs had ``f`` in place of ``omega``: then that is named.
+        Whether the inputs had ``f`` instead of ``omega``; then the remark names it.
     units : mapping
-        The units that were typed, by input: a value is doubted in its own.
+        The units that were typed, by input; a remark shows a value in its own unit.
     names : mapping
-        Other names of inputs, as those of the parts of a motion.
+        Other names of inputs, such as those of the parts of a motion.
 
     Examples
     --------
@@ -105,7 +105,8 @@ def remarks(
 def remarks_on_motion(
     columns: Mapping[str, Any], amplitudes: Mapping[str, Any], frequency: bool = False
 ) -> list[Note]:
-    """Return the remarks on motions, each amplitude as y0, and on those in which nothing moves.
+    """Return the remarks on motions, with each amplitude checked as y0, and on motions in which
+    nothing moves.
 
     Parameters
     ----------
@@ -129,7 +130,7 @@ def remarks_on_motion(
     found: list[Note] = []
     for name, size in amplitudes.items():
         input_ = "Fz_amplitude" if name == "normal" else "y0"
-        amplitude = np.where(size > 0.0, size, math.nan)  # a part that is still is another matter
+        amplitude = np.where(size > 0.0, size, math.nan)  # a part without motion is another remark
         for one in remarks({**columns, input_: amplitude}, frequency, names={input_: name}):
             if one.field not in {other.field for other in found}:
                 found.append(one)
@@ -146,7 +147,7 @@ def remarks_on_motion(
 
 
 def _of_still(six: Mapping[str, Array], frequency: bool) -> list[Note]:
-    """Return what is said of legal contacts that are not shaken, by the input that is 0."""
+    """Return the remarks on legal contacts that are not shaken, by the input that is 0."""
     legal = (six["mu0"] > 0.0) & (six["Fz"] > 0.0) & (six["k"] > 0.0) & (six["v0"] >= 0.0)
     legal &= np.isfinite(six["mu0"]) & np.isfinite(six["Fz"]) & np.isfinite(six["v0"])
     found: list[Note] = []
@@ -161,8 +162,8 @@ def _of_still(six: Mapping[str, Array], frequency: bool) -> list[Note]:
 
 
 def _usual(columns: Mapping[str, Any]) -> bool:
-    """Return whether one case in plain numbers oscillates across or along within all usual ranges:
-    looked up in a microsecond."""
+    """Return whether one case in plain numbers oscillates across or along, with all values in their
+    usual ranges.  This takes a microsecond."""
     mu0, load, k, y0, omega, v0 = map(columns.get, ("mu0", "Fz", "k", "y0", "omega", "v0"))
     if not (type(mu0) is type(load) is type(k) is type(y0) is type(omega) is type(v0) is float):
         return False
@@ -188,8 +189,8 @@ def _usual(columns: Mapping[str, Any]) -> bool:
 
 
 def _out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
-    """Yield every input, and where it is outside its usual range; a rigid contact, zero where it is
-    legal, and what is not legal are not."""
+    """Yield every input with the cases in which it is outside its usual range.  A rigid contact, a
+    legal zero and an illegal value are not outside."""
     for name, (least, most) in _USUAL.items():
         column = six[name]
         outside = ((column < least) | (column > most)) & np.isfinite(column) & (column > 0.0)
@@ -197,8 +198,8 @@ def _out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
 
 
 def _groups_out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
-    """Yield l0, y~, v~ and the peak speed, and where no contact has them; of legal contacts
-    alone."""
+    """Yield l0, y~, v~ and the peak speed with the legal contacts for which no contact has such a
+    value."""
     length = six["mu0"] * six["Fz"] / six["k"]
     elastic = (length > 0.0) & (six["Fz"] > 0.0) & (six["k"] > 0.0)
     moves = _oscillates(six) & elastic
@@ -220,7 +221,7 @@ def _sentence(
     units: Mapping[str, Unit],
     names: Mapping[str, str],
 ) -> tuple[str, str]:
-    """Return the input that is doubted, and why, of one case."""
+    """Return the input of one case that may be wrong, and why."""
     length = case["mu0"] * case["Fz"] / case["k"] if case["k"] else math.inf
     swing = names.get("y0", "y0")
 
@@ -269,8 +270,8 @@ _CONTACTS = "contacts have 0.01 to 100"
 
 
 def _is(name: str, word: str, value: float, units: Mapping[str, Unit]) -> str:
-    """Return the question whether the value of an input, which is called a ``word``, is right; of a
-    number without a unit, whether it is in SI."""
+    """Return the question whether the value of an input is right; ``word`` describes it.  For a
+    number without a unit, ask whether it is in SI."""
     if name in units:
         return f"is {word} = {_quantity(value, units[name])} right?"
     return f"is {word} = {plain(value, 6)} in {INPUTS[name].unit}?"
@@ -282,26 +283,26 @@ def _number(value: float, unit: Unit) -> str:
 
 
 def _quantity(value: float, unit: Unit) -> str:
-    """Return the same with the unit."""
+    """Return the value with the unit."""
     return f"{_number(value, unit)} {unit.symbol}".rstrip()
 
 
 def _largest(case: Mapping[str, float], *names: str) -> str:
-    """Return the input, of these, which is furthest above what contacts have."""
+    """Return the input among ``names`` that is furthest above the values of real contacts."""
     return max(names, key=lambda name: case[name] / _LARGE[name])
 
 
 def _stiff_or(case: Mapping[str, float], other: str) -> str:
-    """Return the input, of those that make a group large, which is furthest from what contacts
-    have."""
+    """Return the input that makes v~ or y~ large: of k and ``other``, the one that is furthest from
+    the values of real contacts."""
     name = _largest(case, other, "k")
     lightness = _SMALL_LOAD / case["Fz"]
     return "Fz" if lightness > case[name] / _LARGE[name] else name
 
 
 def _of_rigid(stiffness: float, cases: int = 1) -> Note:
-    """Return what a rigid contact assumes, with the stiffness that must be far exceeded for it
-    [N/m]; of many cases the largest."""
+    """Return the assumption of a rigid contact, with the stiffness that must be far exceeded for it
+    [N/m]; for many cases the largest one."""
     text = "rigid: the contact does not stretch before it slips"
     if math.isfinite(stiffness):
         text += (

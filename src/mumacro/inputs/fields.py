@@ -1,20 +1,21 @@
-"""The inputs of a case, one row each: name, symbol, unit, meaning, bound, usual range, example; the
-contact and the direction of the oscillation; and what functions take, for type checkers.
+"""List the inputs of a case, one row each: name, symbol, unit, meaning, bound, usual range,
+example.  List also the contacts and the directions of the oscillation, and the types of arguments
+for type checkers.
 
 The library, the files, the command line, the service, the page and the exports take the words for
-an input from here.  A frequency ``f`` [Hz] may be given in place of the angular frequency ``omega``
-[rad/s], exactly one of them.  The stiffness ``k`` has no default: it is a positive number, or rigid
-contact by the word ``rigid`` or by infinity.
+an input from here.  A frequency ``f`` [Hz] may replace the angular frequency ``omega`` [rad/s];
+exactly one of them is necessary.  The stiffness ``k`` has no default: it is a positive number, or a
+rigid contact by the word ``rigid`` or by infinity.
 
-**A gap is never rigid**: a single None or NaN is refused, an empty cell, null or NaN in a column
+**A gap is never rigid**: a single None or NaN is refused.  An empty cell, null or NaN in a column
 ``k`` makes its case illegal, see :data:`GAP`.
 
-One spring, shaken across, is the default.  ``contact="ball"`` is a sphere on a flat, Hertz under a
+The default is one spring, shaken across.  ``contact="ball"`` is a sphere on a flat, Hertz under a
 constant load, as independent springs (method of dimensionality reduction): mu~(v~, y~) = (3/2)
 int_0^1 s mu~_spring(v~/(1.5 s), y~/(1.5 s)) d xi with s = 1 - xi^2 and l0 = mu0 Fz / k, where k = 8
-a G* is the stiffness before slip.  ``direction="along"`` shakes along the sliding direction,
-``"normal"`` the normal force, Fz + Fz_amplitude cos(omega t).  The formulas are in
-``kernel/contact.c`` and ``kernel/directions.c``; here are the names.
+a G* is the stiffness before slip.  ``direction="along"`` shakes along the sliding direction; with
+``"normal"`` the normal force is Fz + Fz_amplitude cos(omega t).  The formulas are in
+``kernel/contact.c`` and ``kernel/directions.c``; this module has the names.
 """
 
 import math
@@ -27,7 +28,7 @@ from numpy.typing import ArrayLike
 from mumacro.errors import InputError
 
 RAD_PER_CYCLE = 2.0 * math.pi  # omega [rad/s] at f = 1 Hz
-RIGID = "rigid"  # the word for a stiffness without bound
+RIGID = "rigid"  # the word for an infinite stiffness
 GAP = "is missing; write rigid or a number"  # the reason for refusing a gap in a column k
 #: what a stiffness must be, in messages of :class:`InputError`
 STIFFNESS = 'a number > 0 [N/m], or for a rigid contact "rigid" or math.inf'
@@ -37,18 +38,19 @@ LIFTS_OFF = ">= 0 and below Fz: at Fz the contact lifts off"  # the bound of Fz_
 
 
 class Field(NamedTuple):
-    """One input."""
+    """Describe one input."""
 
     name: str
-    symbol: str  #: in formulas and pictures
-    quantity: str  #: what it measures, a key of :data:`mumacro.inputs.units.QUANTITIES`
-    unit: str  #: in SI
+    symbol: str  #: symbol in formulas and pictures
+    quantity: str  #: its quantity, a key of :data:`mumacro.inputs.units.QUANTITIES`
+    unit: str  #: unit in SI
     words: str  #: the unit in words, for errors such as "give metres"
     meaning: str
-    bound: str  #: what every value must satisfy
-    usual: tuple[float, float]  #: outside there is a remark; zero is usual where it is legal
-    example: str  #: as a person types it: the first case of the documentation
-    in_place_of: str = ""  #: another input, where this one stands for it
+    bound: str  #: condition for every value
+    #: outside this range there is a remark; zero is usual if it is legal
+    usual: tuple[float, float]
+    example: str  #: text as a person types it: the first case of the documentation
+    in_place_of: str = ""  #: the input that this one replaces, if it replaces one
 
 
 _ROWS = (
@@ -95,23 +97,23 @@ _ROWS = (
         "Highest stiffness of an interval, beside k_low", ABOVE_ZERO, (1.0, 1e12), "1.2N/um", "k",
     ),
 )  # fmt: skip
-ENDS = ("k_low", "k_high")  # of an interval of k
+ENDS = ("k_low", "k_high")  # the ends of an interval of k
 #: every input by its name
 INPUTS = {row.name: row for row in _ROWS}
 
 #: names of inputs, and the SI unit in words, for errors such as "give metres"
 SI = {row.name: (row.unit, row.words) for row in _ROWS if row.in_place_of in ("", "omega")}
-#: inputs in place of another one -> the input whose unit they have: the amplitude of the normal
+#: inputs that replace another one -> the input whose unit they have: the amplitude of the normal
 #: force, the ends of k
 MEASURED_AS = {"Fz_amplitude": "Fz", "k_low": "k", "k_high": "k"}
 NAMES = tuple(SI)
 FIELDS = tuple(name for name in NAMES if name != "f")
 UNITS = {name: SI[name][0] for name in FIELDS}
-# of a slope along each
+# units of the derivatives
 PER_UNIT = {"mu0": "-", "Fz": "1/N", "k": "m/N", "y0": "1/m", "omega": "s/rad", "v0": "s/m"}
 POSITIVE = tuple(row.name for row in _ROWS if row.bound == ABOVE_ZERO)
 BOUNDS = {row.name: row.bound for row in _ROWS}
-#: other values that are read -> what they measure
+#: other values that are read -> their quantities
 QUANTITY_OF = {row.name: row.quantity for row in _ROWS} | {
     "mu_macro": "ratio",
     "target": "ratio",
@@ -148,8 +150,8 @@ def is_rigid(text: object) -> bool:
 
 
 def quantity_of(name: str) -> str:
-    """Return what a value measures, by the name of an input, of its deviation, of a part of an
-    oscillation, or of another argument; a ratio where the name is not in the list.
+    """Return the quantity of an input, of its deviation, of a part of an oscillation, or of another
+    argument, by its name.  The default is a ratio.
 
     >>> [quantity_of(name) for name in ("v0", "std_k", "normal.amplitude", "y.phase")]
     ['speed', 'stiffness', 'force', 'angle']
@@ -159,7 +161,7 @@ def quantity_of(name: str) -> str:
 
 
 def described(name: str, addition: str = "") -> str:
-    """Return what an input is, with its unit, as descriptions have it.
+    """Return the description of an input, with its unit.
 
     >>> described("v0"), described("f", ", in place of omega")
     ('Sliding speed [m/s]', 'Frequency of the oscillation [Hz], in place of omega')
@@ -168,7 +170,7 @@ def described(name: str, addition: str = "") -> str:
 
 
 def in_help(name: str) -> str:
-    """Return the same within a sentence, with the bound.
+    """Return the description as part of a sentence, with the bound.
 
     >>> in_help("mu0"), in_help("v0")
     ('Coulomb friction coefficient of the contact [-], > 0', 'sliding speed [m/s], >= 0')
@@ -179,7 +181,8 @@ def in_help(name: str) -> str:
 
 
 def field_of(name: str) -> tuple[str, float]:
-    """Return the field behind the name of an input, and its value for one unit of the name.
+    """Return the field of an input by its name, and the value of one unit of the name in this
+    field.
 
     >>> field_of("f"), field_of("y0")
     (('omega', 6.283185307179586), ('y0', 1.0))
@@ -188,7 +191,7 @@ def field_of(name: str) -> tuple[str, float]:
 
 
 def refusal(name: str, value: float) -> str:
-    """Return why ``value`` is no legal value of an input; NaN stands for a gap, which is never a
+    """Return why ``value`` is not a legal value of an input; NaN stands for a gap, which is never a
     rigid contact.
 
     >>> refusal("v0", -1.0), refusal("k", math.nan)
@@ -213,11 +216,11 @@ DIRECTIONS: tuple[DirectionName, ...] = ("across", "along", "normal")
 
 
 class Springs(NamedTuple):
-    """What is known of a contact's springs without an evaluation."""
+    """Describe a contact's springs, as far as no evaluation is necessary."""
 
     meaning: str
     exponent: float  #: k grows with this power of the load
-    middle_load: float  #: load of the middle spring over the mean
+    middle_load: float  #: load of the middle spring divided by the mean load
 
 
 #: by contact
@@ -225,7 +228,7 @@ SPRINGS_OF: dict[str, Springs] = {
     "spring": Springs("one spring of stiffness k", 0.0, 1.0),
     "ball": Springs("a ball (Hertz) with the initial stiffness k", 1.0 / 3.0, 1.5),
 }
-AMPLITUDE = "Fz_amplitude"  # of the normal force [N], in place of y0
+AMPLITUDE = "Fz_amplitude"  # amplitude of the normal force [N], replaces y0
 AMPLITUDES = ("y0", AMPLITUDE)
 #: the six inputs by code of the direction
 FIELDS_OF = (
@@ -236,40 +239,40 @@ FIELDS_OF = (
 
 
 class Kind(NamedTuple):
-    """A contact and a direction by their codes in the kernel."""
+    """Hold a contact and a direction by their codes in the kernel."""
 
     contact: int
     direction: int
 
     @property
     def normal(self) -> bool:
-        """Whether the normal force oscillates."""
+        """Return whether the normal force oscillates."""
         return DIRECTIONS[self.direction] == "normal"
 
     @property
     def amplitude(self) -> str:
-        """The input that says how far it oscillates."""
+        """Return the input that is the amplitude of the oscillation."""
         return AMPLITUDES[self.normal]
 
     @property
     def other_amplitude(self) -> str:
-        """The input that says so for other directions."""
+        """Return the amplitude of the other directions."""
         return AMPLITUDES[not self.normal]
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """The six inputs by name, :data:`mumacro.inputs.fields.FIELDS` with Fz_amplitude in place
-        of y0 for normal."""
+        """Return the names of the six inputs: :data:`mumacro.inputs.fields.FIELDS`, with
+        Fz_amplitude instead of y0 for normal."""
         return FIELDS_OF[self.direction]
 
     @property
     def names(self) -> dict[str, Any]:
-        """Both as the keywords of ``evaluate``."""
+        """Return contact and direction as keywords of ``evaluate``."""
         return {"contact": CONTACTS[self.contact], "direction": DIRECTIONS[self.direction]}
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of columns that a table of cases may have."""
+        """Return the names of the columns that a table of cases may have."""
         return (*self.fields, "f")
 
 
@@ -280,13 +283,13 @@ _KINDS: dict[tuple[str, str], Kind] = {
     for i, contact in enumerate(CONTACTS)
 }
 del _KINDS["ball", "normal"]
-#: all that there are
+#: all pairs that exist
 KINDS = (*_KINDS.values(),)
 
 
 def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
-    """Return the codes of a contact and a direction; InputError for unknown names and a ball whose
-    normal force oscillates.
+    """Return the codes of a contact and a direction.  Raise InputError for unknown names, and for a
+    ball whose normal force oscillates.
 
     >>> kind_of("ball", "along")
     Kind(contact=1, direction=1)
@@ -313,14 +316,15 @@ def kind_of(contact: str = "spring", direction: str = "across") -> Kind:
 if TYPE_CHECKING:
     Numbers = ArrayLike
     Oscillation = Any
-else:  # a signature shows the name, in place of a union of twenty lines
+else:  # a signature shows this name instead of a union of twenty lines
 
     class Numbers:
-        """A number in SI, a text with a unit such as "2um", a quantity, or an array of numbers."""
+        """Accept a number in SI, a text with a unit such as "2um", a quantity, or an array of
+        numbers."""
 
     class Oscillation:
-        """An amplitude, a text such as "2um@90deg", (amplitude, phase in degrees), or a list of
-        (harmonic, amplitude, phase): see :func:`mumacro.motion`."""
+        """Accept an amplitude, a text such as "2um@90deg", (amplitude, phase in degrees), or a list
+        of (harmonic, amplitude, phase): see :func:`mumacro.motion`."""
 
 
 _Value = float | str  # a text is read as a person types it
@@ -356,13 +360,13 @@ class _One(_Deviations[_Value], _Options, total=False):
 
 
 class OneCase(_One):
-    """One case."""
+    """Type the inputs of one case."""
 
     k: _Value
 
 
 class OneInterval(_One):
-    """One case whose k is an interval."""
+    """Type the inputs of one case whose k is an interval."""
 
     k_low: Required[_Value]
     k_high: Required[_Value]
@@ -384,11 +388,11 @@ class _Inputs(_Deviations[_AnyValue], Generic[_AnyValue], total=False):
 
 
 class ManyCases(_Inputs[ArrayLike], _Options, total=False):
-    """Cases as arrays, or names that stand beside a mapping."""
+    """Type the inputs of cases as arrays, or names that are given with a mapping."""
 
 
 class AnyCases(_Inputs[Any], total=False):
-    """The same of any type, such as labelled arrays or quantities with units."""
+    """Type the same inputs of any type, such as labelled arrays or quantities with units."""
 
     include: Any
     gradient: bool

@@ -1,8 +1,7 @@
-"""How a table as text is written: found once, from its first lines, for every reader.
+"""Find how a table as text is written, once, from its first lines, for all functions that read it.
 
-:func:`find_layout` finds the header, which is the first line that names what is needed, then the
-units of its columns (:mod:`mumacro.inputs.column_units`) and the first row
-(:mod:`mumacro.inputs.account`).
+:func:`find_layout` finds the header (the first line with all necessary names), then the units of
+its columns (:mod:`mumacro.inputs.column_units`) and the first row (:mod:`mumacro.inputs.account`).
 """
 
 import re
@@ -25,35 +24,35 @@ from mumacro.inputs.decoding import NAMES
 from mumacro.inputs.names import heading, meant_by
 from mumacro.inputs.numbers import Signs
 
-#: separators of the cells, by the name that an option has
+#: separators of the cells, by the name in an option
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t", "blanks": BLANKS}
 _WORDS = {",": "comma", ";": "semicolon", "|": "bar", "\t": "tab", BLANKS: "blanks"}
 _WORDS_OF_SIGNS = {".": "point", ",": "comma"}
-LOOKED_AT = 2_000  #: lines, in which the header must stand
-_ABOVE = 4  # lines above the names in which their units may stand
+LOOKED_AT = 2_000  #: the header must be within this number of lines
+_ABOVE = 4  # units may be within this number of lines above the names
 _SEP_LINE = re.compile(r'\ufeff?"?sep=([,;|\t])"?', re.IGNORECASE)
 _LABEL = re.compile(r"[^\W\d]\w{0,19}:\s+")  # before the names in a comment
 
 
 class Dialect(NamedTuple):
-    """How a person says that a table is written; what is None is found out."""
+    """Hold what a person says about the layout of a table; None means that it is to be found."""
 
     sep: str | None = None  #: a character, or :data:`BLANKS`
     decimal: str | None = None
-    thousands: str | None = None  #: empty where there is none
+    thousands: str | None = None  #: empty if there is none
     encoding: str | None = None
     skip: int = 0  #: lines to leave out at the beginning
-    dashes: str = "--"  #: before the name of an option, in messages
+    dashes: str = "--"  #: text before the name of an option, in messages
     rows: tuple[int, int] | None = None  #: the first and the last line of data
-    sheet: str | None = None  #: of a workbook
+    sheet: str | None = None  #: sheet of a workbook
 
     def signs(self, layout: "Layout") -> Signs:
-        """Return what is known of the signs of numbers in a table."""
+        """Return what is known about the separators in the numbers of a table."""
         return Signs(self.decimal or layout.decimal, self.thousands, layout.sep, self.dashes)
 
 
 class _Declared(NamedTuple):
-    """What the lines before the header say of the table."""
+    """Hold what the lines before the header say about the table."""
 
     sep: str | None = None
     decimal: str | None = None
@@ -62,40 +61,40 @@ class _Declared(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """How a table is written."""
+    """Hold how a table is written."""
 
     encoding: str
     header: Header
     units: ColumnUnits
     declared: _Declared
     first: int  #: the first line that may be data
-    last: int | None  #: the last one, where it is said
-    skipped: list[int]  #: lines before the data that are not empty, and neither header nor units
-    repeated: list[int]  #: of these, those that have the header again
+    last: int | None  #: the last line of data, if a person names it
+    skipped: list[int]  #: lines before the data that are not empty, not the header and not units
+    repeated: list[int]  #: those of them that repeat the header
 
     @property
     def line(self) -> int:
-        """The line of the header."""
+        """Return the line of the header."""
         return self.header.start + 1
 
     @property
     def heads(self) -> list[str]:
-        """The names of the columns, with their units in brackets."""
+        """Return the names of the columns, with their units in brackets."""
         return self.units.heads
 
     @property
     def inputs(self) -> dict[int, str]:
-        """The columns that mean something, by their places."""
+        """Return the columns that have a meaning, by their index."""
         return self.units.inputs
 
     @property
     def sep(self) -> str:
-        """What separates the cells, :data:`BLANKS` for any number of blanks."""
+        """Return the separator of the cells; :data:`BLANKS` means any number of blanks."""
         return self.header.sep
 
     @property
     def decimal(self) -> str | None:
-        """The decimal sign, as the table says itself."""
+        """Return the decimal separator, if the table itself says it."""
         return self.declared.decimal
 
     def account(self, column_names: ColumnNames, dialect: Dialect) -> Account:
@@ -112,7 +111,7 @@ class Layout(NamedTuple):
         return account
 
     def described(self, signs: Signs) -> str:
-        """Return how the table is read, with the unit of each input, in a few words.
+        """Return in a few words how the table is read, with the unit of each input.
 
         >>> column_names = ColumnNames({"v0": "v0", "mu_macro": "mu0"}, [["v0"], ["mu_macro"]])
         >>> lines = ["run 7", "v0;mu_macro", "mm/s;%", "1,5;7"]
@@ -139,9 +138,9 @@ def find_layout(
 ) -> Layout:
     """Find how a table is written, from its first lines.
 
-    Where no line names all that is needed, the header is the line that most probably is meant for
-    it.  TextError where there is no line at all, where units belong to no column or contradict each
-    other, and where rows stand before the header.
+    If no line has all necessary names, the header is the line that is most probably meant as a
+    header.  Raise TextError if there is no line at all, if units belong to no column or contradict
+    each other, or if there are rows before the header.
     """
     declared = _declared(lines)
     header = _find_header(lines, column_names, dialect, declared)
@@ -228,8 +227,8 @@ def _declared(lines: Sequence[str]) -> _Declared:
 def _find_header(
     lines: list[str], column_names: ColumnNames, dialect: Dialect, declared: _Declared
 ) -> Header:
-    """Return the first line that names all that is needed and fits the row behind it; where the
-    rows are said, the last one before them."""
+    """Return the first line that has all necessary names and fits the next row.  If a person names
+    the rows, return the last such line before them."""
     sep = dialect.sep or declared.sep
     seps = (sep,) if sep else tuple(SEPARATORS.values())
     candidates = [*islice(_headers_in(lines, dialect.skip, seps, column_names), 20)]
@@ -241,7 +240,7 @@ def _find_header(
         for one in candidates:
             if one.start < header.start:
                 _refuse_rows_between(one, header, lines, dialect)
-    for one in candidates:  # the names in a comment may stand above the header itself
+    for one in candidates:  # the names in a comment may be above the header itself
         between = lines[header.start : one.start]
         if between and all(is_comment(line) or not line.strip() for line in between):
             return one
@@ -251,7 +250,8 @@ def _find_header(
 def _refuse_rows_between(
     before: Header, header: Header, lines: list[str], dialect: Dialect
 ) -> None:
-    """Refuse a table with rows below a header that did not fit them, before the one that fits."""
+    """Refuse a table that has rows between a header that does not fit them and the header that
+    fits."""
     for i in range(before.end, header.start):
         cells = [] if is_comment(lines[i]) else split_header(lines[i], before.sep)
         if len(cells) > 1 and any(map(starts_as_number, cells)):
@@ -266,9 +266,9 @@ def _refuse_rows_between(
 def _headers_in(
     lines: Sequence[str], skip: int, seps: Sequence[str], column_names: ColumnNames
 ) -> Iterator[Header]:
-    """Yield the lines that name all that is needed."""
+    """Yield the lines that have all necessary names."""
     for i in range(skip, min(len(lines), LOOKED_AT)):
-        # of an odd number of quotes a cell goes on in the next line
+        # with an odd number of quotes a cell continues in the next line
         if not column_names.may_be_in(lines[i]) and lines[i].count('"') % 2 == 0:
             continue
         text, end = _whole(lines, i)
@@ -285,7 +285,7 @@ def _headers_in(
 
 
 def _whole(lines: Sequence[str], i: int) -> tuple[str, int]:
-    """Return a line with those behind it in which its quoted cells end, and the index behind
+    """Return a line with the following lines in which its quoted cells end, and the index after
     them."""
     text = lines[i]
     for end in range(i + 1, min(i + 20, len(lines))):
@@ -296,7 +296,7 @@ def _whole(lines: Sequence[str], i: int) -> tuple[str, int]:
 
 
 def _fits(header: Header, lines: Sequence[str], labview: bool) -> bool:
-    """Return whether the row behind a header has as many cells."""
+    """Return whether the row after a header has as many cells."""
     width = len(header.cells)
     for i in range(header.end, len(lines)):
         if lines[i].strip() and not is_comment(lines[i]):
@@ -306,8 +306,8 @@ def _fits(header: Header, lines: Sequence[str], labview: bool) -> bool:
 
 
 def _likely_header(lines: Sequence[str], skip: int, seps: Sequence[str]) -> Header:
-    """Return the line that is probably meant for a header: one whose names are similar to those of
-    inputs, or the one above the first numbers."""
+    """Return the line that is probably meant as a header: a line whose names are similar to those
+    of inputs, or the line above the first numbers."""
     best, most = None, 0.0
     for i in range(skip, min(len(lines), LOOKED_AT)):
         for sep in seps:

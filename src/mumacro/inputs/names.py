@@ -1,5 +1,5 @@
-"""Names of inputs as people write them, alone or over a column with a unit: the input that a name
-stands for, its unit, and what to do about one that is unknown or missing."""
+"""Find the input that a name stands for.  Names are as people write them, alone or above a column
+with a unit.  Return also the unit, and the advice for a name that is unknown or missing."""
 
 import difflib
 import re
@@ -16,8 +16,8 @@ from mumacro.inputs.units import (
     unit_of,
 )
 
-# Lower case, without spaces and punctuation.  Only names that hardly mean anything else, since a
-# file whose column has one of them while the input itself is missing is refused.
+# Lower case, without spaces and punctuation.  Only names that hardly have another meaning, because
+# a file with such a column is refused if the input itself is missing.
 _SYNONYMS = {
     "mu": "mu0",
     "mus": "mu0",
@@ -70,7 +70,7 @@ _SYNONYMS = {
     "slidingvelocity": "v0",
 }
 _SYNONYMS |= {name.lower(): name for name in NAMES}
-# names that people expect, or that said the same before -> what says it now
+# names that people expect, or former names -> the present name
 _FORMER = {
     "k_range": 'written as k_low and k_high, or in k as an interval such as "0.8..1.2 N/um"',
     "std": "written as std_k, std_mu0 and so on: one name for each deviation",
@@ -81,12 +81,12 @@ _FORMER = {
 
 def suggestion(name: str, *, loosely: bool = True) -> str | None:
     """Return the input that ``name`` probably stands for, in another case, by another name or
-    (``loosely``) misspelt; else None.
+    (``loosely``) misspelt, otherwise None.
 
     >>> [suggestion(name) for name in ("FZ", "F", "stiffness", "omga", "temperature")]
     ['Fz', 'Fz', 'k', 'omega', None]
     """
-    if name.strip() == "F":  # a force; without case it would be the frequency f
+    if name.strip() == "F":  # a force; in lower case it would be the frequency f
         return "Fz"
     plain = re.sub(r"[\s_.\-~^*{}$\\]", "", name).lower()
     if plain in _SYNONYMS:
@@ -98,8 +98,8 @@ def suggestion(name: str, *, loosely: bool = True) -> str | None:
 
 
 def in_place_of(name: str, allowed: Iterable[str]) -> str | None:
-    """Return what to write in place of a former name, or of one with a unit, which is the head of
-    a column; None for another name.
+    """Return what to write instead of a former name, or of a name with a unit, which is the header
+    of a column.  Return None for any other name.
 
     >>> in_place_of("y0 [um]", ["y0"]), in_place_of("groups", [])
     ('named y0, with the unit in the value, as in "2 um"', 'written as include="groups"')
@@ -113,7 +113,7 @@ def in_place_of(name: str, allowed: Iterable[str]) -> str | None:
 
 
 def unknown_name(name: str, allowed: Iterable[str]) -> str:
-    """Return why an unknown name is refused, with the most similar one of those allowed.
+    """Return why an unknown name is refused, with the most similar allowed name.
 
     >>> unknown_name("omga", ("omega", "f"))
     'unknown field; did you mean omega? allowed: omega, f'
@@ -130,15 +130,15 @@ def unknown_name(name: str, allowed: Iterable[str]) -> str:
 
 # --- heads of columns -----------------------------------------------------------------------------
 
-# heads that a message lists, and that are compared with misspelt names
+# limits of the headers that a message lists, and that are compared with misspelt names
 _LISTED, _COMPARED = 20, 100
-# "k in N/mm", "k / (N/mm)", "k, N/mm": forms of standards for tables
+# "k in N/mm", "k / (N/mm)", "k, N/mm": forms from standards for tables
 _WITH_UNIT = re.compile(r"(\w+)(?: ?/ ?| in |, ?)(\S.*)")
 
 
 def heading(cell: str, input_of: Mapping[str, str]) -> str:
-    """Return a head as it stands in a table, on one line, with its unit in brackets if it names one
-    of ``input_of``.
+    """Return a header as it is in a table, on one line; put its unit in brackets if its name is in
+    ``input_of``.
 
     >>> heading("v0 / (mm/s)", {"v0": "v0"}), heading("run / day", {"v0": "v0"})
     ('v0 [mm/s]', 'run / day')
@@ -155,7 +155,7 @@ def heading(cell: str, input_of: Mapping[str, str]) -> str:
 def find_heads(
     heads: Sequence[str], input_of: Mapping[str, str]
 ) -> tuple[dict[str, tuple[int, Scale]], list[str]]:
-    """Return the place and unit of each column by name, and the faults of the heads.
+    """Return the index and the unit of each column by name, and the faults of the headers.
 
     ``input_of`` has the names of the columns, and for each the input whose units it has; other
     columns are left out.
@@ -184,7 +184,7 @@ def find_heads(
 
 
 def _why_no_unit(name: str, unit: str, input_name: str) -> str:
-    """Return why a unit of a column is refused, with the number to give where it is clear what is
+    """Return why a unit of a column is refused, with the number to give if it is clear what is
     meant.
 
     >>> _why_no_unit("y0", "um pp", "y0")
@@ -200,7 +200,7 @@ def _why_no_unit(name: str, unit: str, input_name: str) -> str:
 
 
 def meant_by(head: str, *, loosely: bool = True) -> str | None:
-    """Return the input that a head probably stands for, as a whole or by its first word: k for
+    """Return the input that a header probably stands for, as a whole or by its first word: k for
     ``k_N_per_mm``."""
     name = split_unit(head)[0]
     first = re.split(r"[\W_]+", name.strip("_ "))[0]
@@ -208,7 +208,7 @@ def meant_by(head: str, *, loosely: bool = True) -> str | None:
 
 
 def absent(names: Sequence[str], heads: Sequence[str]) -> str:
-    """Return what to do about columns that are missing.
+    """Return what to do about missing columns.
 
     >>> absent(["v0"], ["speed", "mu_macro"])
     "there is no column v0; 'speed' is similar: rename that column to v0 [m/s] (or another unit in
@@ -229,7 +229,7 @@ def absent(names: Sequence[str], heads: Sequence[str]) -> str:
 
 
 def _listed(heads: Sequence[str]) -> str:
-    """Return the heads for a message of bounded length."""
+    """Return the headers for a message of limited length."""
     text = ", ".join(
         repr(head if len(head) <= 80 else f"{head[:77]}...") for head in heads[:_LISTED]
     )
@@ -238,14 +238,14 @@ def _listed(heads: Sequence[str]) -> str:
 
 
 def _heading(name: str) -> str:
-    """Return the heading that a column of an input has, in SI units."""
+    """Return the header of an input's column in SI units."""
     heading = f"{name} [{unit_of(name)}]"
     addition = {"omega": " or f [Hz]", "mu_macro": " (the mean friction force over Fz)"}
     return heading + addition.get(name, "")
 
 
 def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
-    """Return the head that probably stands for an input, and the heading that it should have."""
+    """Return the header that probably stands for an input, and the header that it should be."""
     for loosely, candidates in ((False, heads), (True, heads[:_COMPARED])):
         for head in candidates:
             if field := _stands_for(head, name, loosely):
@@ -255,8 +255,8 @@ def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
 
 
 def _stands_for(head: str, name: str, loosely: bool) -> str | None:
-    """Return the input as which a head probably stands for a column that is missing: omega also as
-    f, and mu_macro as what people call friction.
+    """Return the input for which a header probably stands, if this column is missing.  Omega may
+    also be f, and mu_macro may be what people call friction.
 
     >>> _stands_for("freq", "omega", False), _stands_for("COF", "mu_macro", False)
     ('f', 'mu_macro')
@@ -277,7 +277,7 @@ _PEAK_TO_PEAK = re.compile(
 
 
 def _is_whole(head: str, field: str) -> bool:
-    """Return whether a head says that its column is twice the amplitude.
+    """Return whether a header says that its column is twice the amplitude.
 
     >>> _is_whole("Amplitude p-p [um]", "y0"), _is_whole("peak amplitude [um]", "y0")
     (True, False)
@@ -286,7 +286,7 @@ def _is_whole(head: str, field: str) -> bool:
 
 
 def _unit_in_head(head: str, field: str) -> str | None:
-    """Return the unit that a head has in brackets, or as its last words.
+    """Return the unit that a header has in brackets, or as its last words.
 
     >>> [_unit_in_head(head, "y0") for head in ("Amplitude [um]", "Amplitude µm", "amplitude")]
     ['um', 'µm', None]

@@ -1,8 +1,9 @@
-"""Numbers as people and instruments write them: decimal point or comma, thousands signs, Fortran's
-exponent, powers of ten; in a text, in the texts of one case, in a table, and in a sentence.
+"""Read numbers as people and instruments write them: decimal point or comma, thousands separators,
+Fortran's exponent, powers of ten.  They may be in a text, in the texts of one case, in a table, or
+in a sentence.
 
-``1.000`` alone may be 1 or 1000; ``0.3``, ``2.5e3``, ``1,234.5`` and ``1.234.567`` tell which sign
-is which, and one such number tells it for the whole table.
+``1.000`` alone may be 1 or 1000.  ``0.3``, ``2.5e3``, ``1,234.5`` and ``1.234.567`` show which
+separator is which, and one such number decides for the whole table.
 """
 
 import functools
@@ -13,10 +14,10 @@ from typing import Literal, NamedTuple
 
 from mumacro.errors import InputError, TextError
 
-#: other signs for the same: minus and dashes of typography, a slash, apostrophes
+#: other characters with the same meaning: minus and dashes of typography, a slash, apostrophes
 _SIGNS = str.maketrans("−–‐‑∕⁄’", "----//'")
 _SUPERSCRIPTS = dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻", "0123456789+-", strict=True))
-#: a number at the start of a text: digits with signs between them, an exponent
+#: a number at the start of a text: digits with separators between them, an exponent
 NUMBER = re.compile(
     r"[+-]?(?:\d[\d.,']*|[.,]\d+)(?:(?: \d{3}(?!\d))+(?:[.,]\d+)?)?(?:[eEdD][+-]?\d+)?", re.ASCII
 )
@@ -25,13 +26,13 @@ _WORDS = re.compile(r"[+-]?(?:nan|inf|infinity)", re.IGNORECASE)
 _POWER = re.compile(r" ?[x×*·⋅] ?10\^?([+-]?\d{1,3})", re.ASCII)
 _RAISED = re.compile(r"(?<=10)\^[+-]?\d{1,3}", re.ASCII)
 _TEN = re.compile(r"([+-]?)10\^([+-]?\d{1,3})", re.ASCII)
-# digits in groups of three behind one sign
+# digits in groups of three after one separator
 _GROUPS = re.compile(r"\d{1,3}([.,' ])\d{3}(?:\1\d{3})*", re.ASCII)
 TOO_LARGE = "is too large, above 1.8e308"
 
 
 def plain(value: float, digits: int) -> str:
-    """Return a number in a sentence, without a power of ten where that has up to twelve digits.
+    """Return a number for a sentence, without a power of ten if it has up to twelve digits.
 
     >>> plain(20618.6, 3), plain(251.3, 2), plain(0.00103, 3), plain(2e15, 3)
     ('20600', '250', '0.00103', '2e+15')
@@ -40,10 +41,10 @@ def plain(value: float, digits: int) -> str:
 
 
 def tidy(text: str) -> str:
-    """Return a text with one sign for each meaning, and single blanks.
+    """Return a text with one character for each meaning, and single blanks.
 
-    Signs of full width, such as ２ and ㎛, are those that they stand for; marks that are not seen
-    are left out.
+    Full-width characters, such as ２ and ㎛, become ordinary ones; invisible characters are left
+    out.
 
     >>> tidy(" −1,5 × 10⁻⁶ "), tidy("1.5*10**-6"), tidy("２．５ ㎛")
     ('-1,5 × 10^-6', '1.5*10^-6', '2.5 μm')
@@ -64,8 +65,8 @@ def tidy(text: str) -> str:
 
 @functools.cache
 def _plain(sign: str) -> str:
-    """Return a sign as what it stands for, nothing for a mark that is not seen; a fraction such as
-    ½ and an index stay, which are no digits."""
+    """Return the ordinary form of a character, or nothing for an invisible one.  A fraction such as
+    ½ and an index are kept, because they are not digits."""
     if sign in _SUPERSCRIPTS:
         return _SUPERSCRIPTS[sign]
     if unicodedata.category(sign) == "Cf":
@@ -82,11 +83,11 @@ def is_number(text: str) -> bool:
 
 
 def read_number(text: str, decimal: str = "") -> float:
-    """Return the number in a text; ValueError with the reason where it is none, or may be one of
-    two.
+    """Return the number in a text.  Raise ValueError with the reason if it is not a number, or may
+    mean two numbers.
 
-    ``decimal`` is the decimal sign where it is known; else it is the point, and a comma that
-    cannot be a thousands sign.
+    ``decimal`` is the decimal separator, if it is known.  Otherwise it is the point, or a comma
+    that cannot be a thousands separator.
 
     >>> read_number("1.0D-3"), read_number("2,5"), read_number("1,234.5"), read_number("1.234,5")
     (0.001, 2.5, 1234.5, 1234.5)
@@ -113,8 +114,8 @@ def read_number(text: str, decimal: str = "") -> float:
 
 
 def _double(text: str) -> float:
-    """Return the double of a plain number; too many digits must not pass for an infinite
-    stiffness."""
+    """Return the double of a plain number.  A number with too many digits must not become an
+    infinite stiffness."""
     try:
         if not text.isascii():  # float reads digits of every script
             raise ValueError
@@ -127,7 +128,7 @@ def _double(text: str) -> float:
 
 
 def _with_point(text: str, decimal: str) -> str:
-    """Return a number with a decimal point and no other sign between its digits."""
+    """Return a number with a decimal point and no other separator between its digits."""
     sign, body = (text[0], text[1:]) if text[:1] in "+-" and text else ("", text)
     digits, exponent = body, ""
     for mark in "eEdD":
@@ -136,7 +137,7 @@ def _with_point(text: str, decimal: str) -> str:
             exponent = f"e{exponent}"
             break
     digits = digits.strip()
-    for blank in (" ", "'"):  # these stand between thousands only
+    for blank in (" ", "'"):  # these can only separate thousands
         if blank in digits:
             whole, point, rest = _split(digits, decimal)
             if not _GROUPS.fullmatch(whole):
@@ -155,7 +156,7 @@ def _with_point(text: str, decimal: str) -> str:
         return f"{sign}{whole}{'.' if point else ''}{rest}{exponent}"
     point = max(".,", key=digits.rfind)
     other = "," if point == "." else "."
-    if other in digits:  # 1,234.5: the last sign is the decimal one
+    if other in digits:  # 1,234.5: the last separator is the decimal one
         whole, _, rest = digits.rpartition(point)
         if point in whole or not _GROUPS.fullmatch(whole):
             raise ValueError("must be a number")
@@ -171,15 +172,15 @@ def _with_point(text: str, decimal: str) -> str:
 
 
 def _split(digits: str, decimal: str) -> tuple[str, str, str]:
-    """Return the digits before and behind the decimal sign."""
+    """Return the digits before and after the decimal separator."""
     if decimal:
         return digits.partition(decimal)
     return digits.partition(max(".,", key=digits.rfind))
 
 
 def split_number(text: str) -> tuple[float, str]:
-    """Return the number at the start of a tidy text, and what follows it; ValueError as
-    :func:`read_number`, also where the text does not begin with a number.
+    """Return the number at the start of a tidy text, and the text after it.  Raise ValueError as
+    :func:`read_number` does, and also if the text does not begin with a number.
 
     >>> split_number("1e6N/m"), split_number("2x10^-6 m"), split_number("1 000 N")
     ((1000000.0, 'N/m'), (2e-06, 'm'), (1000.0, 'N'))
@@ -194,15 +195,15 @@ def split_number(text: str) -> tuple[float, str]:
     return read_number(text[:end]), text[end:].strip()
 
 
-# a comma that can be a decimal one only, points that can be thousands signs only; a point that may
-# be either
+# a comma that can only be decimal, points that can only separate thousands; a point that may be
+# either
 _GERMAN = re.compile(r"\d,(?:\d{1,2}|\d{4,})(?!\d)|\d\.\d{3}\.\d{3}(?!\d)|\d\.\d{3},\d")
 _EITHER = re.compile(r"(?<![\d.,])([1-9]\d{0,2})\.(\d{3})(?![\d.,])")
 
 
 def check_signs(texts: Mapping[str, str]) -> None:
-    """Raise InputError for a text of a case that another one makes ambiguous: beside a decimal
-    comma 20.000 may be twenty thousand.
+    """Raise InputError for a text of a case that is ambiguous because of another one: if another
+    text has a decimal comma, 20.000 may be twenty thousand.
 
     >>> check_signs({"mu0": "0,3", "f": "20 kHz", "v0": "0.01"})
     """
@@ -219,7 +220,7 @@ def check_signs(texts: Mapping[str, str]) -> None:
 # --- the signs of a table -------------------------------------------------------------------------
 
 Decimal = Literal[".", ",", ""]
-#: what may stand between thousands, by the name that an option has
+#: characters between thousands, by the name in an option
 THOUSANDS = {".": ".", ",": ",", "space": " ", "'": "'", "none": ""}
 _BLANKS = re.compile("[ \u00a0\u2009\u202f]")
 _DIGITS = re.compile(r"\s*[+\-−]?([\d.,]*)(?:[ '’\u00a0\u2009\u202f]\d{3})*([.,]\d+)?([eEdD])?")
@@ -228,7 +229,7 @@ _GROUPED = re.compile(r"[1-9]\d{0,2}([.,])\d{3}(?:\1\d{3})*")
 
 
 class Cell(NamedTuple):
-    """A cell and its place."""
+    """Hold a cell and its place."""
 
     line: int
     name: str
@@ -236,8 +237,8 @@ class Cell(NamedTuple):
 
 
 def evidence(cell: str) -> tuple[Decimal, bool]:
-    """Return the decimal sign that a number shows, and whether that is sure; "" where it shows
-    none.
+    """Return the decimal separator that a number shows ("" if it shows none), and whether this is
+    certain.
 
     >>> evidence("0,3"), evidence("1.000"), evidence("1.000.000"), evidence("7")
     ((',', True), ('.', False), (',', True), ('', False))
@@ -259,11 +260,11 @@ def evidence(cell: str) -> tuple[Decimal, bool]:
 
 
 class Signs:
-    """What the numbers of a table tell about its decimal sign, as far as they were seen.
+    """Collect what the numbers of a table show about its decimal separator.
 
-    ``decimal`` and ``thousands`` are those given, or None; :attr:`decimal` stays empty while no
-    number has a sign.  Where commas separate the cells, a point is the decimal sign, unless another
-    number shows that it is not.
+    ``decimal`` and ``thousands`` come from the options, or are None; :attr:`decimal` stays empty
+    until a number has a separator.  If commas separate the cells, a point is the decimal separator,
+    unless another number shows that it is not.
     """
 
     def __init__(
@@ -276,13 +277,13 @@ class Signs:
             options = f"{dashes}decimal and {dashes}thousands"
             raise TextError(f"{options} are both {thousands!r}; give one of them")
         self._sep, self._dashes = sep, dashes
-        self.grouped = ""  #: the sign between thousands, once a number has shown it
+        self.grouped = ""  #: the thousands separator, when a number has shown it
         self._cells: dict[tuple[Decimal, bool], Cell] = {}
 
     def see(self, cells: Iterable[Cell]) -> None:
-        """Look at numbers, to know what their signs are.
+        """Look at numbers to learn their separators.
 
-        TextError where they contradict each other, or may be read in two ways.
+        Raise TextError if they contradict each other, or if they can be read in two ways.
         """
         cells_by_sign = self._cells
         for cell in cells:
@@ -326,8 +327,8 @@ class Signs:
         )
 
     def check(self, text: str) -> None:
-        """Raise ValueError where a cell has a sign that is neither the given thousands sign nor the
-        decimal sign."""
+        """Raise ValueError if a cell has a separator that is neither the chosen thousands separator
+        nor the decimal one."""
         if self.thousands is None:
             return
         text = _BLANKS.sub(" ", text.replace("’", "'"))
@@ -338,8 +339,8 @@ class Signs:
                 )
 
     def with_points(self, text: str) -> str:
-        """Return a text whose numbers have decimal points and no other signs; ValueError where a
-        sign is neither the decimal one nor between thousands."""
+        """Return a text whose numbers have decimal points and no other separators.  Raise
+        ValueError for a separator that is neither decimal nor between thousands."""
         if not self.decimal:
             return text
         return "..".join(_NUMERAL.sub(self._with_point, part) for part in text.split(".."))

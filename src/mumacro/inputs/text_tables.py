@@ -1,8 +1,9 @@
-"""The rows of tables as people and rigs write them, in pieces, and whole tables in memory.
+"""Read the rows of tables as people and rigs write them, in pieces, and whole tables in memory.
 
-The way of a line: :mod:`mumacro.inputs.decoding` makes lines of bytes; ``layout`` finds the
-separator and the header, ``column_units`` the units; ``account`` says what each line is; here the
-rows are cut out; ``numbers`` finds the decimal separator, and ``cells`` reads the numbers.
+A line passes these modules: :mod:`mumacro.inputs.decoding` makes lines of bytes; ``layout`` finds
+the separator and the header, ``column_units`` the units; ``account`` decides what each line is;
+this module cuts out the rows; ``numbers`` finds the decimal separator, and ``cells`` reads the
+numbers.
 """
 
 import csv
@@ -33,14 +34,14 @@ from mumacro.inputs.workbooks import BEGIN, SEP, read_sheet
 from mumacro.kernel.arrays import Array, Places
 
 _BETWEEN_BLANKS = re.compile(r'"[^"]*"|\S+')
-_BETWEEN = re.compile(r"[,;|\s]+")  # whatever separates cells
+_BETWEEN = re.compile(r"[,;|\s]+")  # anything that separates cells
 _PAIRS = [(first, second) for first in map(chr, range(256)) for second in map(chr, range(256))]
-# by the first two bytes of a cell, whether it begins as numbers do
+# by the first two bytes of a cell: whether it begins like a number
 _BEGINS_NUMBER = np.array(
     [a.isascii() and (a.isdigit() or (a in "+-." and b in "0123456789.")) for a, b in _PAIRS]
 )
-# by the first two bytes of a name, whether the line may be a comment, or begin with a word such as
-# mean; signs that are neither ASCII letters nor those of numbers are looked at
+# by the first two bytes of a name: whether the line may be a comment, or begin with a word such as
+# mean.  Other characters than ASCII letters and those of numbers are examined
 _MAY_BE_OTHERWISE = np.array(
     [
         not (a.isascii() and (a.isalpha() or a in "0123456789+-."))
@@ -60,20 +61,20 @@ _BEHIND_BLANKS = {
 }
 _OPEN_QUOTE = {sep: re.compile(rb'(?<![^%b\n]) *+"' % sep.encode()) for sep in ",;|\t"}
 _UNCLOSED = re.compile(rb' *+"(?:[^"]++|"")*+\Z')
-_EXCERPT = 500  # characters that are kept of a row that is refused
-_AT_ONCE = 2_000  # rows that are searched for the decimal sign at a time
+_EXCERPT = 500  # characters that are kept of a refused row
+_AT_ONCE = 2_000  # rows that are searched for the decimal separator at a time
 
 
 class Most(NamedTuple):
-    """The largest table that is read."""
+    """Limit the size of a table."""
 
     rows: int = 1_000_000
     columns: int = MOST_COLUMNS
     cell: int = LONGEST  #: characters
 
     def check(self, piece: Piece) -> None:
-        """Check lines before they are taken apart, whatever separates their cells: TextError for
-        one with too many cells or too long a cell.
+        """Check lines before they are split, for every separator.  Raise TextError for a line with
+        too many cells or too long a cell.
 
         >>> Most(cell=3).check(Piece(7, "a,b\\na,abcd"))
         Traceback (most recent call last):
@@ -89,23 +90,24 @@ class Most(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Rows of a table in order, as text: each has as many cells as the head."""
+    """Hold rows of a table in order, as text: each has as many cells as the header."""
 
     data: bytes  #: UTF-8; each row ends with a line feed
-    ends: Places  #: the places of these line feeds
+    ends: Places  #: positions of these line feeds
     lines: Places  #: the line of the file in which each row begins
-    #: by the index of a row: its text, and why it is none of this table; its cells are empty
+    #: by the index of a row: its text, and why it does not belong to this table; its cells are
+    #: empty
     faults: dict[int, tuple[str, str]]
     sep: str
 
     @property
     def has_quotes(self) -> bool:
-        """Whether there is a quote."""
+        """Return whether there is a quote."""
         return b'"' in self.data
 
     @property
     def is_cut_by_lines(self) -> bool:
-        """Whether each line feed ends a row."""
+        """Return whether each line feed ends a row."""
         return not self.has_quotes or self.data.count(b"\n") == self.ends.size
 
     def cells(self) -> Iterator[list[str]]:
@@ -127,10 +129,10 @@ class Rows(NamedTuple):
 
 
 def rows_in(first: int, text: str, account: Account) -> tuple[Rows, str]:
-    """Return the rows of lines, of which ``first`` is the number of the first, and the beginning of
-    a row that goes on behind them.
+    """Return the rows in some lines (``first`` is the number of the first line), and the beginning
+    of a row that continues after them.
 
-    Lines that are something else than a row of numbers are looked at one by one.
+    Lines that are not rows of numbers are examined one by one.
     """
     sep = account.sep
     if account.header.sep == BLANKS:
@@ -165,9 +167,9 @@ def rows_in(first: int, text: str, account: Account) -> tuple[Rows, str]:
 
 
 def _cut(first: int, data: bytes, sep: str) -> tuple[bytes, Places, Places, str]:
-    """Return whole rows, the places of their ends and of the signs between their cells, and the
-    beginning of a row whose quote is not closed; TextError where a quote is not at the end of its
-    cell."""
+    """Return complete rows, the positions of their ends and of the separators between their cells,
+    and the beginning of a row whose quote is not closed.  Raise TextError if a quote is not at the
+    end of its cell."""
     rest, bare = "", data
     quotes: Places = np.zeros(0, np.intp)
     if b'"' in data:
@@ -177,7 +179,7 @@ def _cut(first: int, data: bytes, sep: str) -> tuple[bytes, Places, Places, str]
             quotes = quotes[:0]
     signs = np.frombuffer(bare, np.uint8)
     ends, seps = (np.flatnonzero(signs == ord(sign)) for sign in ("\n", sep))
-    if quotes.size:  # what stands behind an odd number of quotes is within a cell
+    if quotes.size:  # text after an odd number of quotes is within a cell
         ends, seps = (places[np.searchsorted(quotes, places) % 2 == 0] for places in (ends, seps))
     return data, ends, seps, rest
 
@@ -196,8 +198,8 @@ def _surround_cells(data: bytes, quotes: Places, sep: str) -> bool:
 
 
 def _without_quotes(first: int, data: bytes, sep: str) -> tuple[bytes, bytes, str]:
-    """Return rows with quotes in other places, too: the same with zeros in place of quoted cells,
-    and the beginning of a row whose quote is not closed."""
+    """Return rows that may have quotes in other places: the rows, the rows with zeros instead of
+    quoted cells, and the beginning of a row whose quote is not closed."""
     if b' "' in data:
         data = _BEHIND_BLANKS[sep].sub(rb"\1", data)
     bare = _QUOTED[sep].sub(lambda match: b"0" * len(match[0]), data)
@@ -218,21 +220,21 @@ def _unclosed(line: int) -> TextError:
 def _doubtful(
     account: Account, data: bytes, starts: Places, ends: Places, seps: Places
 ) -> list[int]:
-    """Return the rows that are looked at one by one: those that do not begin as numbers do, have
-    not as many cells as the header, or may be the header again."""
+    """Return the rows that must be examined one by one, because they do not begin like numbers, do
+    not have as many cells as the header, or may repeat the header."""
     if not ends.size:
         return []
     signs = np.frombuffer(data, np.uint8)
-    until = np.searchsorted(seps, ends)  # so many stand before the end of each row
+    until = np.searchsorted(seps, ends)  # number of separators before the end of each row
     before = np.concatenate([[0], until[:-1]])
     is_doubtful = until - before != account.width - 1
     place = min(account.units.inputs, default=0)
     first = starts
-    if place and seps.size:  # a name stands first: what matters is the first cell of an input, too
+    if place and seps.size:  # the first column is a name: test the first cell of an input, too
         is_doubtful |= _MAY_BE_OTHERWISE[_begin_of(starts, signs)]
         first = np.minimum(seps[np.minimum(before + place, seps.size) - 1] + 1, signs.size - 1)
     is_doubtful |= ~_BEGINS_NUMBER[_begin_of(first, signs)]
-    # the row of units below the header again may begin like a number
+    # the row of units below a repeated header may begin like a number
     is_doubtful[0] |= bool(account.repeated)
     place = data.find(name := account.name.encode())
     while place >= 0:
@@ -244,7 +246,7 @@ def _doubtful(
 
 
 def _begin_of(cells: Places, signs: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    """Return the first two bytes of the cells that begin at places, behind a quote."""
+    """Return the first two bytes of the cells that begin at some positions, after a quote."""
     last = signs.size - 1
     first = cells + (signs[cells] == _QUOTE)
     second = np.minimum(first + 1, last)
@@ -257,9 +259,9 @@ def _begin_of(cells: Places, signs: NDArray[np.uint8]) -> NDArray[np.uint16]:
 
 
 class TextTable:
-    """A table in a file, or in bytes: how it is written, and its rows in pieces.
+    """Read a table in a file or in bytes: how it is written, and its rows in pieces.
 
-    TextError tells why it is none; every piece is checked before it is taken apart.
+    TextError tells why it is not a table; every piece is checked before it is split.
     """
 
     def __init__(
@@ -272,7 +274,7 @@ class TextTable:
         self._column_names, self._check = column_names, check
         self._source, self._dialect, self._said = _sheet_in(source, column_names, dialect)
         text, start = self._text(), list[str]()
-        self._start = list[Piece]()  # of the text
+        self._start = list[Piece]()  # first pieces of the text
         for piece in text:
             check(piece)
             self._start.append(piece)
@@ -285,13 +287,13 @@ class TextTable:
 
     @property
     def read_as(self) -> str:
-        """How the table was read, once it is."""
+        """Return how the table was read, after it was read."""
         described = self.layout.described(self.signs)
         return self._said + described + headers_left_out(self.account.repeated)
 
     def find_signs(self) -> None:
-        """Look for the signs of numbers in the first rows, and then in the first pieces; not where
-        columns are missing, as that is what is to be said."""
+        """Search the first rows, and then the first pieces, for the separators of numbers.  Skip
+        this if columns are missing, because then that is reported."""
         is_known = self._column_names.are_all_in(self.layout.heads)
         for last in (self.layout.first + _AT_ONCE, None):
             if is_known and not self.signs.decimal:
@@ -300,15 +302,15 @@ class TextTable:
         self._start = []
 
     def rows(self, report_place: Callable[[int], None] = lambda _place: None) -> Iterator[Rows]:
-        """Yield the rows in pieces; ``report_place`` is told how far a file is read."""
+        """Yield the rows in pieces, and tell ``report_place`` how far a file has been read."""
         yield from self._rows_of(self._text(report_place), None)
         if self._rest:
             raise _unclosed(self._behind - self._rest.count("\n") - 1)
 
     def _rows_of(self, pieces: Iterable[Piece], last: int | None) -> Iterator[Rows]:
-        """Yield the rows of pieces, down to the line ``last``."""
+        """Yield the rows of pieces, up to the line ``last``."""
         self.account = self.layout.account(self._column_names, self._dialect)
-        # the beginning of a row that goes on behind a piece, and the line behind the piece
+        # the beginning of a row that continues after a piece, and the line after the piece
         self._rest, self._behind = "", self.layout.first
         ends = [line for line in (last, self.layout.last) if line is not None]
         end = min(ends, default=None)
@@ -327,7 +329,7 @@ class TextTable:
             yield rows
 
     def see_signs(self, rows: Rows) -> None:
-        """Look at the numbers of some rows until they tell what their signs are."""
+        """Examine the numbers of some rows until they show their separators."""
         if b"." not in rows.data and b"," not in rows.data:
             return
         numbered = zip(range(rows.ends.size), rows.lines.tolist(), rows.cells(), strict=True)
@@ -348,7 +350,7 @@ class TextTable:
 
 def _between(piece: Piece, first: int, last: int | None) -> tuple[int, str | None]:
     """Return the lines of a piece from ``first`` to ``last``, and the number of the first of them;
-    None where there are none."""
+    None if there are none."""
     start, text = piece
     if start < first:
         lines = text.split("\n", first - start)
@@ -363,8 +365,8 @@ def _between(piece: Piece, first: int, last: int | None) -> tuple[int, str | Non
 def _sheet_in(
     source: Path | bytes, column_names: ColumnNames, dialect: Dialect
 ) -> tuple[Path | bytes, Dialect, str]:
-    """Return a table as text: of a workbook the sheet that has the names, how it is written, and
-    what is to be said of the sheets."""
+    """Return a table as text, how it is written, and what to say about the sheets.  For a workbook
+    the table is the sheet that has the names."""
     if isinstance(source, bytes):
         start = source[:4]
     else:
@@ -384,14 +386,14 @@ def _sheet_in(
 
 
 class TableOfNumbers(NamedTuple):
-    """Columns of numbers that were read."""
+    """Hold the columns of numbers that were read."""
 
     columns: dict[str, Array]  #: by name, in SI, (n,)
     as_written: dict[str, Array]  #: the same in the units of the table
-    units: dict[str, str]  #: of each column in the table; the SI unit where it has none
-    lines: list[int]  #: of each row
-    skipped: list[int]  #: lines that are neither header nor units nor rows, and not empty
-    read_as: str  #: what was found out, see :meth:`mumacro.inputs.layout.Layout.described`
+    units: dict[str, str]  #: unit of each column in the table; the SI unit if it has none
+    lines: list[int]  #: line of each row
+    skipped: list[int]  #: lines that are not empty, not the header, not units and not rows
+    read_as: str  #: how the table was read, see :meth:`mumacro.inputs.layout.Layout.described`
 
 
 def read_numbers(
@@ -400,9 +402,9 @@ def read_numbers(
     dialect: Dialect,
     most: Most = Most(),  # noqa: B008
 ) -> TableOfNumbers:
-    """Return the columns of a table that mean something, in SI, from a file or its bytes.
+    """Return the columns of a table that have a meaning, in SI, from a file or its bytes.
 
-    TextError tells all that is wrong: its ``faults`` are one for each line.
+    TextError tells everything that is wrong: its ``faults`` are one for each line.
 
     >>> data = "Rig 7\\n\\nv0\\tmu_macro\\nmm/s\\t%\\n1,5\\t7\\n2,5\\t9\\n".encode()
     >>> names = ColumnNames({"v0": "v0", "mu_macro": "mu0"}, [["v0"]])
@@ -459,7 +461,7 @@ def read_numbers(
 
 
 def _refuse_named_statistics(account: Account, lines: list[int], rows: list[list[str]]) -> None:
-    """Refuse rows of statistics that have their name in a column that is empty before them."""
+    """Refuse rows of statistics whose name is in a column that is empty before them."""
     for i in set(range(account.width)) - account.units.inputs.keys():
         named = [j for j, cells in enumerate(rows) if cells[i].strip()]
         if named and named[0] > 0 and all(names_statistics(rows[j][i].strip()) for j in named):
@@ -469,8 +471,8 @@ def _refuse_named_statistics(account: Account, lines: list[int], rows: list[list
 
 
 def _wrong_rows(wrong: list[tuple[int, str]], lines: list[int], dialect: Dialect) -> TextError:
-    """Return the error of the rows that are wrong, with the option that leaves them out where they
-    stand before or behind all other rows."""
+    """Return the error for wrong rows, with the option that leaves them out if they are before or
+    after all other rows."""
     error = TextError.of([fault for _, fault in wrong])
     wrong_lines = {line for line, _ in wrong}
     right = [line for line in lines if line not in wrong_lines]
@@ -483,7 +485,7 @@ def _wrong_rows(wrong: list[tuple[int, str]], lines: list[int], dialect: Dialect
 
 
 def headers_left_out(lines: list[int]) -> str:
-    """Return what is said of lines that have the header or its units again.
+    """Return the sentence about lines that repeat the header or its units.
 
     >>> headers_left_out([7]), headers_left_out([])
     ('; the header again in line 7, left out', '')

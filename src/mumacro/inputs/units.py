@@ -1,5 +1,5 @@
-"""The table of units, a unit as text, which scale it has and what is meant by one that a quantity
-cannot have, and numbers as they are shown in a unit."""
+"""Hold the table of units.  Read a unit as text, find its scale, explain a unit that a quantity
+cannot have, and show numbers in a unit."""
 
 import functools
 import math
@@ -13,19 +13,19 @@ from mumacro.inputs.fields import QUANTITY_OF, RAD_PER_CYCLE, SI, quantity_of
 from mumacro.inputs.numbers import TOO_LARGE, tidy
 from mumacro.kernel.arrays import Array
 
-#: one number, or an array of them
+#: one number, or an array of numbers
 Number = TypeVar("Number", float, Array)
 
 
 class Scale(NamedTuple):
-    """The size of a unit in SI: value * times / over.  Small powers of ten stand in ``over``: 2 um
-    are 2 / 1e6, rounded once."""
+    """Hold the size of a unit in SI: value * times / over.  Small powers of ten are in ``over``: 2
+    um are 2 / 1e6, rounded once."""
 
     times: float = 1.0
     over: float = 1.0
 
     def si(self, value: Number) -> Number:
-        """Return a number, or an array, in the SI unit; infinite where it is too large in it."""
+        """Return a number, or an array, in the SI unit; infinite if it is too large."""
         return value * self.times / self.over
 
     def of_si(self, value: float) -> float:
@@ -34,23 +34,23 @@ class Scale(NamedTuple):
 
 
 class Unit(NamedTuple):
-    """A unit by its symbol, as the table writes it, and its size."""
+    """Hold a unit: its symbol in the table, and its size."""
 
     symbol: str
     scale: Scale = Scale()
 
 
 class Quantity(NamedTuple):
-    """What a value measures."""
+    """Describe what a value measures."""
 
-    unit: str  #: in SI
+    unit: str  #: unit in SI
     words: str  #: the unit in words, for errors such as "give metres"
     units: Mapping[str, Scale]
     such_as: str  #: some of the units, for messages
 
     @property
     def bound(self) -> str:
-        """What a text must be, as in "y0 must be ..."."""
+        """Return what a text must be, as in "y0 must be ..."."""
         where = "" if self.unit == "-" else f"in {self.words}: "
         return f"{where}a plain number, or with a unit such as {self.such_as}"
 
@@ -107,7 +107,7 @@ _FREQUENCY = {
 
 
 def _over(upper: Mapping[str, Scale], lower: Mapping[str, Scale]) -> dict[str, Scale]:
-    """Return every unit of ``upper`` over every unit of ``lower``."""
+    """Return every unit of ``upper`` divided by every unit of ``lower``."""
     return {
         f"{one}/{other}": Scale(up.times * down.over, up.over * down.times)
         for one, up in upper.items()
@@ -115,7 +115,7 @@ def _over(upper: Mapping[str, Scale], lower: Mapping[str, Scale]) -> dict[str, S
     }
 
 
-#: what a value may measure -> its units; the only table of units
+#: quantity -> its units; the only table of units
 QUANTITIES = {
     "ratio": Quantity(
         "-",
@@ -214,8 +214,8 @@ _SHOWN: dict[str, dict[str, Scale]] = {
 
 
 def suit_unit(si: str, value: float) -> Unit:
-    """Return the unit in which a value in the unit ``si`` is a number that people read easily: the
-    largest of the usual ones in which it is at least 0.1; the SI unit for 0.
+    """Return a unit in which a value in the unit ``si`` is easy to read: the largest of the common
+    units in which it is at least 0.1; the SI unit for 0.
 
     >>> suit_unit("m", 2.455e-6).symbol, suit_unit("N/m", 13.07e6).symbol
     ('um', 'N/um')
@@ -227,8 +227,8 @@ def suit_unit(si: str, value: float) -> Unit:
 
 
 def in_si(values: Array, scale: Scale) -> Array:
-    """Return the numbers of an array in SI, NaN for one that is too large in it: a large stiffness
-    is no rigid contact.
+    """Return the numbers of an array in SI, NaN for a number that is too large, because a large
+    stiffness is not a rigid contact.
 
     >>> in_si(np.array([2.0, 1e308]), Scale(times=1e3))
     array([2000.,   nan])
@@ -241,7 +241,7 @@ def in_si(values: Array, scale: Scale) -> Array:
 
 
 def too_large_in_si(values: Array, si: Array) -> dict[int, str]:
-    """Return what is wrong with the numbers that :func:`in_si` made NaN, by their index."""
+    """Return the faults of the numbers that :func:`in_si` made NaN, by their index."""
     places = np.flatnonzero(np.isnan(si) & ~np.isnan(values))
     return dict.fromkeys(places.tolist(), TOO_LARGE)
 
@@ -325,12 +325,12 @@ _NAMED = {
 }
 _FACTOR = re.compile(r"([^\d^+-]+)\^?([+-]?\d)?", re.ASCII)
 _MU = str.maketrans("µμ", "uu")
-LONGEST = 80  # characters of a unit
+LONGEST = 80  # limit of the characters of a unit
 
 
 @functools.lru_cache(1024)
 def canonical(unit: str) -> str:
-    """Return a unit as the table writes it.
+    """Return a unit in the spelling of the table.
 
     >>> [canonical(unit) for unit in ("mm s^-1", "mm/sec", "N·mm⁻¹", "newton / micrometer", "[N]")]
     ['mm/s', 'mm/s', 'N/mm', 'N/um', 'N']
@@ -363,7 +363,7 @@ def canonical(unit: str) -> str:
     return f"{upper or '1'}/{lower}" if lower else upper or text
 
 
-#: every symbol in the table, also within another
+#: every symbol in the table, also within another one
 _SYMBOLS = {
     symbol
     for quantity in QUANTITIES.values()
@@ -372,12 +372,13 @@ _SYMBOLS = {
 }
 
 
-# words of a value that stand apart: of its unit, of an interval, of how an amplitude was measured
+# words that belong to the value before them: of its unit, of an interval, of how an amplitude was
+# measured
 _WORDS = {"per", "to", "rms", "pp", "p-p", "pk-pk", "ptp", "peak", "peak-to-peak"}
 
 
 def belongs_to_value(word: str) -> bool:
-    """Return whether a word behind a value is a part of it, such as a unit that stands apart.
+    """Return whether a word after a value is a part of it, such as a separate unit.
 
     >>> [belongs_to_value(word) for word in ("um", "±", "1.2", "/", "newtons", "fast")]
     [True, True, True, True, True, False]
@@ -393,13 +394,13 @@ def belongs_to_value(word: str) -> bool:
     )
 
 
-# closing bracket -> the one that opens it
+# closing bracket -> its opening bracket
 _OPENING = {"]": "[", ")": "("}
 
 
 def split_unit(column: str) -> tuple[str, str | None]:
-    """Name and unit of a heading such as ``k [N/mm]`` or ``k (N/mm)``; the unit is None where there
-    are no brackets.
+    """Return name and unit of a header such as ``k [N/mm]`` or ``k (N/mm)``; the unit is None if
+    there are no brackets.
 
     >>> split_unit("k [N/mm]"), split_unit("v0")
     (('k', 'N/mm'), ('v0', None))
@@ -414,12 +415,12 @@ def split_unit(column: str) -> tuple[str, str | None]:
     return name.strip(), unit.strip()
 
 
-# an amplitude as vibrations are measured: from zero to the peak
+# an amplitude in the terms of vibration measurement: from zero to the peak
 _PEAK = re.compile(r"(.*?\w) ?(?:0-?|zero[ -]to[ -])?(?:peak|pk|(?<=0)-?p)", re.IGNORECASE)
 
 
 def parse_unit(quantity: str, text: str) -> Unit | None:
-    """Return a unit of a quantity; None for one that is not in the table.  That of a length may say
+    """Return a unit of a quantity, or None if it is not in the table.  The unit of a length may say
     that the value is an amplitude.
 
     >>> parse_unit("speed", "mm sec^-1"), parse_unit("length", "um 0-pk").symbol
@@ -440,7 +441,7 @@ def parse_unit(quantity: str, text: str) -> Unit | None:
 
 
 def scale_of(name: str, unit: str) -> Scale | None:
-    """Return the size of a ``unit`` of a value by its name; None for a unit that is not in the
+    """Return the size of a ``unit`` of a value by its name, or None if the unit is not in the
     table.
 
     >>> scale_of("k", "N/mm").si(3.0)
@@ -451,7 +452,7 @@ def scale_of(name: str, unit: str) -> Scale | None:
 
 
 def unit_of(name: str) -> str:
-    """Return the SI unit of a value by its name; of a phase degrees.
+    """Return the SI unit of a value by its name; degrees for a phase.
 
     >>> [unit_of(name) for name in ("k_low", "mu_macro", "x.amplitude", "y.phase")]
     ['N/m', '-', 'm', 'deg']
@@ -478,14 +479,14 @@ _INPUT = {"frequency": "f", "angular frequency": "omega", "speed": "v0", "length
 
 
 def is_level(unit: str) -> bool:
-    """Return whether a unit is one of levels, such as dB, whose reference is not said."""
+    """Return whether a unit is a level, such as dB, whose reference is not stated."""
     words = re.split(r"[^a-z]+", unit[:LONGEST].lower())
     return any(word.rstrip("s") in _LEVELS or word.startswith("db") for word in words)
 
 
 def explain_unit(quantity: str, number: float, unit: str) -> str:
-    """Return what a value must be whose ``unit`` its quantity cannot have: as in "y0 must be ...",
-    with the number to give where it is clear what is meant.
+    """Return what a value must be if its quantity cannot have ``unit``, as in "y0 must be ...",
+    with the number to give if it is clear what is meant.
 
     >>> explain_unit("length", 4.0, "umpp"), explain_unit("force", 100.0, "g")
     ('half of peak to peak: give 2um', 'a force: the weight of 100 g is 0.980665 N, give 0.980665N')
@@ -542,8 +543,8 @@ def explain_unit(quantity: str, number: float, unit: str) -> str:
 
 
 def known(value: float, digits: int, error: float = 0.0, deviation: float = 0.0) -> str:
-    """Return a number with ``digits`` digits, less those that are not known: none is below the
-    first digit of its ``error``, or the second of its ``deviation``.
+    """Return a number with ``digits`` digits, or fewer: no digit is below the first digit of its
+    ``error``, or below the second digit of its ``deviation``.
 
     >>> known(0.24046650645751835, 6), known(0.24046650645751835, 6, deviation=0.0136)
     ('0.240467', '0.240')
@@ -567,8 +568,8 @@ def known(value: float, digits: int, error: float = 0.0, deviation: float = 0.0)
 def choose_unit(
     name: str, value: float, typed: Mapping[str, str], digits: int | None = None
 ) -> Unit:
-    """Return the unit in which an input is shown: the one that was typed, or the one that suits a
-    value [SI]; with a number of ``digits``, the SI unit.
+    """Return the unit in which an input is shown: the unit that was typed, or a suitable one for a
+    value [SI].  With a number of ``digits`` return the SI unit.
 
     >>> choose_unit("y0", 2e-6, {}).symbol, choose_unit("y0", 2e-6, {"y0": "mm"}).symbol
     ('um', 'mm')
@@ -582,15 +583,15 @@ def choose_unit(
 def format_number(
     value: float, unit: Unit, count: int, digits: int | None = None, error: float = 0.0
 ) -> str:
-    """Return a value [SI] as a number of a unit, with ``count`` digits, less those that its
-    ``error`` leaves unknown; or with ``digits``."""
+    """Return a value [SI] as a number of a unit, with ``count`` digits, or fewer if its ``error``
+    does not support them; or with ``digits``."""
     if digits is not None:
         return f"{value:.{digits}g}"
     return known(unit.scale.of_si(value), count, unit.scale.of_si(error))
 
 
 def format_quantity(value: float, unit: Unit, count: int, digits: int | None = None) -> str:
-    """Return the same with the unit.
+    """Return the number with the unit.
 
     >>> format_quantity(2.4547623e-6, suit_unit("m", 2.4547623e-6), 4)
     '2.455 um'

@@ -1,7 +1,7 @@
-"""A sheet of a workbook (.xlsx) as text, a line for each row; needs openpyxl.
+"""Read a sheet of a workbook (.xlsx) as text, a line for each row; this needs openpyxl.
 
-openpyxl reads row by row.  A reader that holds the whole rectangle of a sheet is no choice here: a
-file of 5 kB with one cell in the last corner asks it for 512 GB, and ends the process.
+openpyxl reads row by row.  Other packages hold the whole rectangle of a sheet in memory: a file of
+5 kB with one cell in the last corner needs 512 GB, and ends the process.
 """
 
 import datetime
@@ -17,20 +17,21 @@ from typing import Any, BinaryIO
 from mumacro.errors import TextError, missing
 from mumacro.inputs.numbers import evidence
 
-# other zip files, by what their first member or the list of their members begins with
+# other zip files, by the beginning of their first member or of the list of their members
 _OPEN_DOCUMENT = b"mimetypeapplication/vnd.oasis.opendocument"
 BEGIN = b"PK\x03\x04"  #: the first bytes of a workbook
-SEP = "\t"  #: between the cells of a line
-_ROWS = 1_048_576  # rows of a sheet of Excel, at most
-# bytes of the parts of a workbook, unpacked, at most: openpyxl reads sheets row by row, the texts
-# of cells into a list, and everything else into objects, of which 1 MiB of styles takes 16 MiB
+SEP = "\t"  #: separator of the cells in a line
+_ROWS = 1_048_576  # largest number of rows of a sheet of Excel
+# largest size of the parts of a workbook, unpacked, in bytes: openpyxl reads sheets row by row, the
+# texts of cells into a list, and everything else into objects, which for 1 MiB of styles take 16
+# MiB
 _SHEETS, _TEXTS, _OTHERS = 512 * 2**20, 64 * 2**20, 4 * 2**20
 # parts that openpyxl does not open here
 _UNREAD = tuple(f"xl/{name}" for name in ("media/", "charts/", "drawings/", "embeddings/", "pivot"))
-_LOOKED_AT = 2_000  # rows of a sheet, in which the names must stand
-_LARGEST = 100 * 2**20  # characters of a sheet as text
+_LOOKED_AT = 2_000  # the names must be within this number of rows of a sheet
+_LARGEST = 100 * 2**20  # largest number of characters of a sheet as text
 _FORMULA = re.compile(rb"<f[ />]")
-# what a number format adds to a number: texts in quotes, or signs behind a backslash
+# what a number format adds to a number: texts in quotes, or characters after a backslash
 _LITERAL = re.compile(r'"([^"]*)"|\\(.)')
 
 
@@ -40,12 +41,12 @@ def read_sheet(
     decimal: str | None,
     has_names: Callable[[list[str]], bool],
 ) -> tuple[bytes, str]:
-    """Return a sheet as UTF-8, a line for each row with tabs between the cells, and what is to be
-    said of it.
+    """Return a sheet as UTF-8, a line for each row with tabs between the cells, and what to say
+    about it.
 
-    It is the one of the name ``sheet``, else the visible one in whose first lines ``has_names``
-    finds the names that are needed.  TextError where there is none or several, where it is no
-    workbook, or openpyxl is missing.
+    The sheet is the one with the name ``sheet``, or else the visible one in whose first lines
+    ``has_names`` finds the necessary names.  Raise TextError if there is not exactly one such
+    sheet, if the file is not a workbook, or if openpyxl is missing.
     """
     with io.BytesIO(source) if isinstance(source, bytes) else source.open("rb") as stream:
         _refuse_no_workbook(stream)
@@ -64,7 +65,7 @@ def read_sheet(
             text = _as_text(one, formulas, decimal)
         except TextError:
             raise
-        except Exception as error:  # openpyxl raises what a damaged file makes it to
+        except Exception as error:  # a damaged file makes openpyxl raise any exception
             reason = " ".join(str(error).split())[:200] or type(error).__name__
             raise TextError(f"it is no workbook, or a damaged one ({reason})") from None
     rest = [repr(other.title) for other in book.worksheets if other.title != one.title]
@@ -141,8 +142,8 @@ def _has_formulas(stream: BinaryIO) -> bool:
 
 
 def _weigh(stream: BinaryIO) -> None:
-    """Refuse a workbook that would be too large unpacked; the directory of the zip file tells the
-    sizes, and no part unpacks to more than that."""
+    """Refuse a workbook that would be too large when unpacked.  The directory of the zip file tells
+    the sizes, and no part unpacks to more."""
     sizes = dict.fromkeys((_SHEETS, _TEXTS, _OTHERS), 0)
     with zipfile.ZipFile(stream) as parts:
         for part in parts.infolist():
@@ -160,7 +161,7 @@ def _weigh(stream: BinaryIO) -> None:
 
 
 def _refuse_no_workbook(stream: BinaryIO) -> None:
-    """Name a zip file for what it is, where that is no workbook; openpyxl refuses a damaged one."""
+    """Say what a zip file is if it is not a workbook; openpyxl refuses a damaged one."""
     if _OPEN_DOCUMENT in stream.read(200):
         raise TextError("it is an OpenDocument file (.ods); save it as .xlsx or as CSV")
     try:
@@ -176,7 +177,7 @@ def _refuse_no_workbook(stream: BinaryIO) -> None:
 
 
 def _text(cell: Any, decimal: str | None) -> str:
-    """Return a cell as it would be typed: with the decimal sign that is given, and with the unit
+    """Return a cell as a person would type it: with the chosen decimal separator, and with the unit
     that its number format shows."""
     value = cell.value
     if value is None:
@@ -185,13 +186,13 @@ def _text(cell: Any, decimal: str | None) -> str:
         return value.isoformat()
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         form = cell.number_format or ""
-        # the sheet shows 7 % where it holds 0.07
+        # the sheet shows 7 % for 0.07
         number = f"{100 * value:.15g}%" if "%" in form else repr(value)
         shown = "".join(a or b for a, b in _LITERAL.findall(form.partition(";")[0])).strip()
         unit = f" {shown}" if any(map(str.isalpha, shown)) else ""
         return (number.replace(".", decimal) if decimal else number) + unit
     text = " ".join(str(value).split())
-    # a text that may be one of two numbers is none of them, unless the sign is given
+    # a text that may mean two numbers means none of them, unless the separator is chosen
     doubtful = not decimal and evidence(text) in ((".", False), (",", False))
     return _quoted(f"'{text}" if doubtful else text)
 
