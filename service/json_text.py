@@ -190,8 +190,8 @@ def decode_rows(
 def _pieces(text: bytearray) -> Iterator[bytes]:
     """Yield a list of rows as lists of about ``_PIECE`` bytes.
 
-    No name and no word of a row has a brace: where a brace stands in a text all the same, the piece
-    that ends there is no JSON.
+    Names and words of a row have no brace.  If a text has one, the piece that ends there is not
+    JSON, and is refused.
     """
     start = text.index(b"[") + 1
     while comma := _COMMA.match(text, text.find(b"}", start + _PIECE) + 1):

@@ -181,7 +181,7 @@ def master_curve_limit(x: ArrayLike) -> Any:
     It has full relative accuracy down to x = 0.  The curves of the model differ from it by 2e-4 (y~
     = 0.1), 1.6e-3 (0.3), 5e-3 (0.5). docs/model.md derives it.
 
-    >>> round(float(master_curve_limit(1e-12)) / 1e-12, 4)        # the slope at creep, pi
+    >>> round(float(master_curve_limit(1e-12)) / 1e-12, 4)        # the slope at rest, pi
     3.1416
     """
     # b = arcsin x, 2 d = duration of slip, 2 h = duration of stick: tan b = sin^2 d / (h - sin h
