@@ -13,20 +13,19 @@ A *cost*, here and in the models and routers, is the time of a computation divid
 mu_macro of one spring that is shaken across, one case of a long column.
 """
 
+import _thread
 import asyncio
 import logging
 import math
 import os
 import sys
-import threading
 import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from ipaddress import ip_network
-from typing import Any, Generic, NamedTuple, TypeVar
-from weakref import WeakSet
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from fastapi import Request
 from starlette.requests import ClientDisconnect
@@ -48,25 +47,30 @@ _MOST_WAITING = 64  # largest number of requests that wait for a slot
 _RECENTLY_S = 10.0  # for this time a client that has asked counts as another one
 # added to the niceness of a thread with long work, so that short requests are answered first
 _NICENESS = 5
+_LOOK_EVERY_S = 0.01  # between two looks whether all threads have ended
 _TICKET = "mumacro.ticket"  # key in the scope of a request that holds something
 _log = logging.getLogger("mumacro.admission")
 
 
-_threads = WeakSet[threading.Thread]()  # threads that do work
-
-
 class Thread(Generic[T]):
     """Do work in its own thread, which does not keep the process alive.  Raise RuntimeError if no
-    thread can start."""
+    thread can start.
+
+    ``threading.Thread`` would let the loop wait until the new thread runs, behind all others.
+    """
+
+    alive: ClassVar[set["Thread[Any]"]] = set()
 
     def __init__(self, work: Callable[[], T], niceness: int = 0) -> None:
         self.stop, self._loop = Stop(), asyncio.get_running_loop()
         #: result of the work: its return value or its exception
         self.done: asyncio.Future[T] = self._loop.create_future()
-        arguments = work, niceness
-        thread = threading.Thread(target=self._run, args=arguments, name="work", daemon=True)
-        thread.start()
-        _threads.add(thread)
+        self.alive.add(self)
+        try:
+            _thread.start_new_thread(self._run, (work, niceness))
+        except RuntimeError:
+            self.alive.discard(self)
+            raise
 
     def _run(self, work: Callable[[], T], niceness: int) -> None:
         if niceness and sys.platform == "linux":  # on Linux niceness belongs to the thread
@@ -79,18 +83,19 @@ class Thread(Generic[T]):
             end = partial(self.done.set_exception, error)
         with suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(self._end, end)
+        self.alive.discard(self)
 
     def _end(self, tell: Callable[[], None]) -> None:
         tell()
         self.done.exception()  # perhaps nobody waits for it any more
 
 
-def join_threads(seconds: float) -> bool:
+async def threads_end(seconds: float) -> bool:
     """Wait up to this time until all work has ended, and return whether it has."""
     end = time.monotonic() + seconds
-    for thread in [*_threads]:
-        thread.join(max(0.0, end - time.monotonic()))
-    return not any(thread.is_alive() for thread in _threads)
+    while Thread.alive and time.monotonic() < end:
+        await asyncio.sleep(_LOOK_EVERY_S)
+    return not Thread.alive
 
 
 class _Waiting(NamedTuple):

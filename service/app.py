@@ -27,7 +27,7 @@ from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from . import __version__
-from .admission import Admission, Admitted, Thread, join_threads
+from .admission import Admission, Admitted, Thread, threads_end
 from .bodies import Direct
 from .guide_pages import GuidePages
 from .metrics import Metrics
@@ -143,7 +143,7 @@ async def _end(admission: Admission) -> None:
     admission.end()
     now = asyncio.get_running_loop().time()
     seconds = min(admission.stops_at, now) + _END_S - now
-    if not await asyncio.to_thread(join_threads, seconds) and (lines := LogLines.running):
+    if not await threads_end(seconds) and (lines := LogLines.running):
         _log.warning("the process ends beside a thread that does not end")
         lines.flush()
         os._exit(0)

@@ -1,14 +1,15 @@
 """Counters: their values, over all code paths and all workers."""
 
+import _thread
 import json
 import os
 import re
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
@@ -164,15 +165,10 @@ def test_a_slot_is_given_back_when_its_thread_cannot_start_and_counters_need_non
 ) -> None:
     law = {**CASE, "start": 1e-3, "stop": 1.0}
     del law["v0"]
-    start, name = threading.Thread.start, "work"
-
-    def refuse(self: threading.Thread) -> None:
-        if self.name == name:
-            raise RuntimeError("can't start new thread")
-        start(self)
 
     with monkeypatch.context() as without_threads:
-        without_threads.setattr(threading.Thread, "start", refuse)
+        refuse = Mock(side_effect=RuntimeError("can't start new thread"))
+        without_threads.setattr(_thread, "start_new_thread", refuse)
         for _ in range(20):
             assert fresh.post("/v1/law", json=law).status_code == 503
     assert fresh.app.state.admission.slots == 0
