@@ -206,19 +206,22 @@ export function fitPanel(store, moved, openCase) {
         (skipped.length > 8 ? ", …" : "")
       : "";
     return html`<p class="hint">${how ? `Recognised: ${how}; ` : ""}${count} points${more}.</p>
-      <div class="scroll">
-        <table>
-          <thead>
-            <tr>
-              ${names.map((name) => html`<th scope="col">${head(name)}</th>`)}
-            </tr>
-          </thead>
-          <tbody>
-            ${Array.from({ length: Math.min(count, ROWS) }, (_, i) => row(i))}
-          </tbody>
-        </table>
-      </div>
-      ${count > ROWS ? html`<p class="hint">and ${count - ROWS} more</p>` : nothing}`;
+      <details>
+        <summary>The points as they were read</summary>
+        <div class="scroll">
+          <table>
+            <thead>
+              <tr>
+                ${names.map((name) => html`<th scope="col">${head(name)}</th>`)}
+              </tr>
+            </thead>
+            <tbody>
+              ${Array.from({ length: Math.min(count, ROWS) }, (_, i) => row(i))}
+            </tbody>
+          </table>
+        </div>
+        ${count > ROWS ? html`<p class="hint">and ${count - ROWS} more</p>` : nothing}
+      </details>`;
   }
 
   function draw() {

@@ -124,7 +124,7 @@ export function inputsPanel(store, moved) {
       </button>
     `;
     return html`<p class="ways">
-      <span>k from:</span> ${tool("stiffness", "materials", "k from materials")}
+      <span>from</span> ${tool("stiffness", "materials", "k from materials")}
       ${tool("fit", "points", "k from measured points of friction")}
       ${interval}
       <a title="k from a measured loop" href=${pageOf("how-to/loop")}>loop</a>

@@ -24,6 +24,7 @@ import {
 const { area, bisectCenter } = d3;
 
 const POINTS = 241;
+const HALF_NAME = 30; // pixels about the name of a line
 const FAR = 0.25; // of the axis of µ: what is drawn above that has an axis that does not begin at 0
 const FLAT = 0.03; // of µ: what varies less is drawn over an axis from 0
 const EXTREMES = [1e-300, 1e300]; // of a range
@@ -166,15 +167,18 @@ export function lawPanel(store, moved) {
     nameStatic(places);
   }
 
-  /** Names the dotted line where it is about as far from the curve as anywhere, to the right. */
+  /** Names the dotted line where it is about as far from the curve as anywhere, to the right, and
+   * clear of a border. */
   function nameStatic(places) {
     const { box } = plot;
     const away = law.mu_static.map((mu, i) => Math.abs(plot.y(mu) - plot.y(law.mu_macro[i])));
-    const inner = away.map((far, i) => {
-      const x = plot.x(places[i]) - box.x;
-      return x > 40 && x < box.width - 40 ? far : -1;
-    });
-    const i = inner.findLastIndex((far) => far >= 0.9 * Math.max(...inner));
+    const lines = law.border.map(({ value }) => plot.x(toUnit(law.along, value, unit())));
+    const edges = [box.x, box.x + box.width, ...lines];
+    const inner = away.map((far, i) =>
+      edges.every((edge) => Math.abs(plot.x(places[i]) - edge) > HALF_NAME) ? far : -1,
+    );
+    const i = inner.findLastIndex((far) => far >= Math.max(0, 0.9 * Math.max(...inner)));
+    if (i < 0) return;
     const [x, y] = [plot.x(places[i]), plot.y(law.mu_static[i])];
     const foot = box.y + box.height;
     const below = law.mu_static[i] <= law.mu_macro[i] ? y + 14 < foot : y - 14 < box.y;

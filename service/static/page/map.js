@@ -5,7 +5,7 @@ import { $, attribute, write } from "./dom.js";
 import { caseOf, inputsOf } from "./state.js";
 import { Plot } from "./plot.js";
 import { get } from "./service.js";
-import { about, inPrint, inWords, middleOf, show, toUnit, unitAt, whole } from "./words.js";
+import { about, inPrint, inUnit, inWords, middleOf, show, toUnit, unitAt, whole } from "./words.js";
 
 const { contours } = d3;
 
@@ -230,7 +230,15 @@ export function mapPanel(store, moved, loaded) {
     const { box } = plot;
     const ratio = ratioAt((at[0] - box.x) / box.width, 1 - (at[1] - box.y) / box.height);
     const there = `ṽ = ${show(v, 3)}, ỹ = ${show(y, 3)}, µ/µ₀ ≈ ${show(ratio, 3)}`;
-    write("map-read", whole(`At the pointer: ${there}`));
+    const size = ownSizes();
+    const own = (name, value) => {
+      const unit = unitAt(name, value, answer.inputs[name].unit);
+      return `${about.inputs[name].symbol} = ${inUnit(name, value, unit, 3)}`;
+    };
+    const words = size
+      ? `${own("v0", v * size.v0)}, ${own(amplitude(), y * size[amplitude()])}; `
+      : "";
+    write("map-read", whole(`At the pointer: ${words}${there}`));
   }
 
   /** The values of the case at a place of the map. */

@@ -52,7 +52,6 @@ const plainly = (text) =>
     .replace(/@0$/, "");
 const BEYOND = "too large to be written";
 const TAKEN = 6; // digits of a value that is taken into the form
-const HEAD = 26; // pixels above a plot, for what it shows
 const LINE = 14; // pixels between two names
 
 export function motionPanel(store, moved) {
@@ -262,9 +261,6 @@ export function motionPanel(store, moved) {
     return [low - room, high + room];
   }
 
-  /** Says above a plot what it shows. */
-  const headed = (plot, words) => plot.text(words, plot.box.x, 14, "note head", "start");
-
   /** The three forces over one period. */
   function paintForces() {
     const cycle = motion?.cycle;
@@ -275,10 +271,8 @@ export function motionPanel(store, moved) {
     forces.axes({
       x: { domain: [0, 1], log: false, title: "time, in periods" },
       y: { domain: padded([0, ...all]), log: false, title: "force [N]" },
-      top: HEAD,
       right: 30,
     });
-    headed(forces, "Forces");
     forces.path(
       [
         [0, 0],
@@ -307,11 +301,11 @@ export function motionPanel(store, moved) {
     const drift = (cycle.x.at(-1) - cycle.x[0]) / cycle.t.at(-1);
     const along = cycle.x.map((x, i) => 1e6 * (x - drift * cycle.t[i]));
     const across = cycle.y.map((y) => 1e6 * y);
-    const half =
-      0.55 * Math.max(...[along, across].map((one) => Math.max(...one) - Math.min(...one)), 1e-9);
+    const [length, width] = [along, across].map((one) => Math.max(...one) - Math.min(...one));
     const middle = (one) => (Math.max(...one) + Math.min(...one)) / 2;
-    const ratio = Math.max(path.width - 80, 1) / Math.max(path.height - 42 - HEAD, 1);
-    const [wide, tall] = ratio > 1 ? [half * ratio, half] : [half, half / ratio];
+    const ratio = Math.max(path.width - 80, 1) / Math.max(path.height - 52, 1);
+    const tall = 0.55 * Math.max(length / ratio, width, 1e-9); // the path fills the frame
+    const wide = tall * ratio;
     path.axes({
       x: {
         domain: [middle(along) - wide, middle(along) + wide],
@@ -319,9 +313,7 @@ export function motionPanel(store, moved) {
         title: "x − v₀t [µm]",
       },
       y: { domain: [middle(across) - tall, middle(across) + tall], log: false, title: "y [µm]" },
-      top: HEAD,
     });
-    headed(path, "Path of the body");
     path.path(
       along.map((x, i) => [x, across[i]]),
       "curve",

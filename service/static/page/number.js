@@ -61,11 +61,12 @@ function shareOf({ mu_macro_low: low, mu_macro_high: high, mu_ratio: ratio, inpu
   return from === to ? to : `${from.replace(" %", "")} to ${to}`;
 }
 
-/** What of µ₀ is left, in words. */
+/** What of µ₀ is left, in words; where an input has a deviation, the share has one, too. */
 export function remains(answer) {
   const share = shareOf(answer);
   if (answer.mu_ratio === 0) return "Nothing of µ₀ is left";
-  return `${share === "100 %" ? "All" : share} of µ₀ is left`;
+  const much = share === "100 %" ? "all" : share;
+  return capital(`${answer.std ? "about " : ""}${much} of µ₀ is left`);
 }
 
 /** The regimes of an interval of k, and where one begins: a law over it. */
@@ -102,7 +103,7 @@ function variance({ std_share: shares }) {
 /** A remark in the page's signs; an interval of k is shown for this one. */
 function sentence(text, inputs) {
   const k = numberOf(inputs?.k);
-  const example = k === undefined ? "" : `, such as ${around(k)}`;
+  const example = k === undefined ? "" : ` (${around(k)})`;
   return prose(text.replace("give k as an interval", `give k as an interval${example}`)).replace(
     /[^.!?]$/,
     "$&.",
@@ -216,6 +217,7 @@ export function numberPanel(store) {
     write("regime", whole(spread(answer)));
     $("regime").classList.toggle("two", middleOf(answer) !== "");
     write("short", shortOf(answer, old ? faults : []));
+    $("advice").classList.toggle("old", old || store.dragged);
     if (store.dragged) return; // words may grow, and would move the map that is dragged
     const [first, ...rest] = sayings(answer);
     const said = ({ row, words }) => html`<b>${capital(row)}.</b> ${whole(words)}`;

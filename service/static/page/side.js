@@ -49,7 +49,7 @@ function tabs(id, chosen = () => {}) {
 }
 
 const NONE_YET = html`<p class="hint">There is no number yet.</p>`;
-const MOST = 8; // digits that have room beside a unit
+const MOST = 7; // digits that have room beside a unit
 
 /** The other numbers of a case, as `list` takes them. */
 function numbers(answer, all) {
