@@ -88,8 +88,10 @@ class OneLineParser(argparse.ArgumentParser):
             message = f"{fault}, did you mean {near[0]}?" if near else message
         _, unknown, option = message.partition("unrecognized arguments: ")
         if unknown:
-            near = difflib.get_close_matches(option.split()[0], self._option_string_actions, n=1)
+            first = option.partition(" ")[0]
+            near = difflib.get_close_matches(first, self._option_string_actions, n=1)
             message += f", did you mean {near[0]}?" if near else ""
+            message += "" if option.strip() else "an empty one"
         message = message.replace("the following arguments are required", "missing")
         lines = (self.epilog or "").splitlines()
         example = next((line.strip() for line in lines if line.startswith("  mumacro ")), None)

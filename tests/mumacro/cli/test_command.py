@@ -142,6 +142,11 @@ def test_a_value_may_stand_apart_from_its_name(capsys: Capture) -> None:
     assert output_of(capsys, 0, apart) == output_of(capsys, 0, CASE)
 
 
+@pytest.mark.parametrize("empty", ["", " "])
+def test_an_empty_argument_is_told(capsys: Capture, empty: str) -> None:
+    assert "unrecognized arguments: " in ended(capsys, 2, "table", empty)
+
+
 def test_a_misspelt_option_is_told_with_the_right_one(capsys: Capture) -> None:
     for wrong, right in (("--directoin", "--direction"), ("--diggits=3", "--digits")):
         assert f"did you mean {right}?" in ended(capsys, 2, CASE, wrong)
