@@ -1,4 +1,4 @@
-"""``python -m builder``: build, verify, query and export tables offline."""
+"""Run ``python -m builder``: build, verify, query and export tables offline."""
 
 import errno
 import math
@@ -27,8 +27,8 @@ from mumacro.kernel.threads import processors
 
 
 class _Bar:
-    """Progress as a line on stderr: one that is written again on a terminal, elsewhere one for each
-    finished stage."""
+    """Show progress as a line on stderr: on a terminal one line that is rewritten, elsewhere one
+    line for each finished stage."""
 
     def __init__(self, stages: int) -> None:
         self.stages, self.finished, self.start = stages, 0, time.monotonic()
@@ -46,13 +46,14 @@ class _Bar:
 
 
 def _writer() -> None:
-    """Import what writes a table file: where it is missing, that is said before the work."""
+    """Import the package that writes a table file, so that a missing one is reported before the
+    work."""
     import_module("netCDF4")
 
 
 def _place(out: Path, folder: bool = False) -> None:
-    """Refuse a place for a result whose folder is missing or shut, or a folder in place of a
-    file."""
+    """Refuse a place for a result if its folder is missing or not writable, or if it is a folder
+    where a file is needed."""
     if not out.parent.is_dir():
         raise UsageError(f"--out {out}: folder {str(out.parent)!r} does not exist")
     if out.is_dir() and not folder:
@@ -136,7 +137,7 @@ def _verify(options: Namespace) -> int:
 
 def _export(options: Namespace) -> str:
     table, kind, out = options.path or options.table, options.format, options.out
-    if kind == "c":  # which needs no further package
+    if kind == "c":  # the C export needs no further package
         from .export.c import DEFAULT_TOLERANCE, write_c
 
         surrogate = open_table(table or repr(DEFAULT_TOLERANCE))
@@ -161,7 +162,7 @@ def _export(options: Namespace) -> str:
 
 
 def _report(options: Namespace, members: dict[str, Any]) -> str:
-    """Return what was written, as JSON or in columns, as ``mumacro table``."""
+    """Return what was written, as JSON or in columns, in the way of ``mumacro table``."""
     if options.json:
         return as_json(members)
     return in_columns([(name, _text(value)) for name, value in members.items()])
@@ -252,7 +253,7 @@ def _workers_argument(parser: OneLineParser) -> None:
     parser.add_argument("--workers", type=_whole(1, 1024), default=processors(), help=text)
 
 
-#: each command, what adds its arguments to a parser, and its help
+#: each command, the function that adds its arguments to a parser, and its help
 _COMMANDS: tuple[
     tuple[Callable[[Namespace], int | str], Callable[[OneLineParser], None], str], ...
 ] = (
@@ -291,7 +292,7 @@ def _parser(prog: str) -> OneLineParser:
 
 
 def main(arguments: Sequence[str] | None = None, prog: str = "python -m builder") -> int:
-    """Run the command; return the exit code."""
+    """Run the command and return the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     options = _parser(prog).parse_args(words or ["--help"])
     try:

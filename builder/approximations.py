@@ -1,5 +1,5 @@
-"""The paper's approximations along a friction law, by equation number, and the speeds at which
-continuous sliding begins by its formulas for the border."""
+"""Compute the paper's approximations along a friction law, by equation number, and the speeds at
+which continuous sliding begins by its formulas for the border."""
 
 import math
 from typing import Any
@@ -13,8 +13,8 @@ from mumacro.kernel.arrays import Array
 from mumacro.questions.law import Law
 from mumacro.surrogate import Surrogate
 
-#: column -> its formula and range; NaN elsewhere.  A formula without an equation number is this
-#: project's own.
+#: column -> its formula and range; NaN outside.  A formula without an equation number is from this
+#: project
 APPROXIMATIONS = {
     "static": "eqs. (16), (38), the limit v0 -> 0: mu0 sqrt(1 - y~^2), 0 for y~ >= 1",
     "creep": "slow sliding, first order: mu0 (sqrt(1 - y~^2) + pi v~ / (2 (1 - y~^2))), or mu0 "
@@ -63,11 +63,12 @@ def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
     """Return the approximations of :data:`APPROXIMATIONS` along a law [-], (n,); NaN outside the
     stated range.
 
-    InputError for a ball, and an oscillation along or normal: the article has one spring, across.
+    Raise InputError for a ball, and for an oscillation along or normal, because the article has one
+    spring, across.
     """
     inputs = _spring_inputs(law)
     mu0, v, y = inputs["mu0"], law.answer.v_tilde, law.answer.y_tilde
-    # rigid contact has no finite v~ and y~; eq. (37) is then the result
+    # a rigid contact has no finite v~ and y~; eq. (37) is then the result
     elastic = np.isfinite(v) & np.isfinite(y)
     small_y, slides = elastic & (y <= 1.0), elastic & (law.answer.regime == "continuous")
     near_corner = elastic & (np.abs(y - 1.0) <= _CORNER_REACH) & (v > 0.0) & (v < 1.0)
@@ -76,7 +77,7 @@ def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
     with np.errstate(all="ignore"):
         creep = law.mu_static + at_rest.gradient["v0"] * inputs["v0"]
         border, fit_border = surrogate.v_tilde_crit(y), closed_forms.border_27(y)
-        # without oscillation v~crit is 0, and v~/v~crit is infinite for every speed but 0
+        # without oscillation v~crit is 0, and v~/v~crit is infinite for every speed except 0
         rho, fit_rho = (np.where(v > 0.0, v / crit, 0.0) for crit in (border, fit_border))
         static, critical, top = (
             closed_forms.static_limit(y),
@@ -110,7 +111,7 @@ def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
 
 
 def approximate_borders(y: Array) -> dict[str, Array]:
-    """Return v~crit(y~) [-] by the formulas of :data:`BORDERS`, each an array like ``y``; NaN
+    """Return v~crit(y~) [-] by the formulas of :data:`BORDERS`, each in an array like ``y``; NaN
     outside the stated range.
 
     >>> crit = approximate_borders(np.array([0.5, 2.0]))
@@ -135,11 +136,12 @@ def _spring_inputs(law: Law) -> dict[str, Any]:
 
 
 def border_speeds(surrogate: Surrogate, law: Law) -> dict[str, Array]:
-    """Return v0 [m/s] at which continuous sliding begins, for each case of a law, exact and as in
+    """Return v0 [m/s] at which continuous sliding begins, for each case of a law, exact and by
     :data:`BORDERS`; (n,).
 
-    NaN where an approximation does not apply and where y~ is beyond double range; 0 for rigid
-    contact and without oscillation, which never stick.  InputError as in :func:`approximations`.
+    It is NaN where an approximation does not apply and where y~ is beyond double range; it is 0 for
+    a rigid contact and without oscillation, which never stick.  InputError is raised as in
+    :func:`approximations`.
     """
     inputs = _spring_inputs(law)
     y, omega = law.answer.y_tilde, inputs["omega"]

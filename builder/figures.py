@@ -1,11 +1,12 @@
-"""The figures of Benad, Nakano, Popov, Popov (2018), Fig. 4 to 11, from this project's solver and a
-table.
+"""Draw the figures of Benad, Nakano, Popov, Popov (2018), Fig. 4 to 11, from this project's solver
+and a table.
 
-Axes are the paper's: v~ over y~ in Fig. 4 to 6, mu~ over v~ in Fig. 8, the normalised rise over
-v~/v~crit in Fig. 9, mu~ over v~/y~ in Fig. 10, mu_macro over v0 in Fig. 11; but Fig. 7 is turned as
-every map here, y~ over v~.  Lines come from the table, dots from fresh solves, crosses and dashed
-lines from the paper's formulas.  A figure is a function of a table that returns what is drawn, and
-its first line is the title; one function draws them all.  Needs matplotlib, the extra ``figures``.
+The axes are the paper's: v~ over y~ in Fig. 4 to 6, mu~ over v~ in Fig. 8, the normalised rise over
+v~/v~crit in Fig. 9, mu~ over v~/y~ in Fig. 10, mu_macro over v0 in Fig. 11.  Only Fig. 7 is turned
+like every map here, y~ over v~.  Lines come from the table, dots from fresh solves, crosses and
+dashed lines from the paper's formulas.  A figure is a function that takes a table and returns what
+is drawn; the first line of its docstring is the title.  One function draws them all.  It needs
+matplotlib, the extra ``figures``.
 """
 
 from collections.abc import Callable
@@ -23,7 +24,7 @@ from mumacro.questions.law import law as friction_law
 from .solver.steady import border
 
 SIZE, DPI = (7.2, 4.8), 110
-# blue, orange, green, vermilion and grey that the colour-blind can tell apart (Okabe and Ito)
+# blue, orange, green, vermilion and grey that colour-blind people can distinguish (Okabe and Ito)
 COLOURS = ["#0072b2", "#e69f00", "#009e73", "#d55e00", *["#6b7683"] * 4]
 V, Y, MU = (
     r"$\tilde v_0 = v_0/(l_0\omega)$",
@@ -41,8 +42,8 @@ CASES = {
 
 
 class Curve(NamedTuple):
-    """Points (n,), how matplotlib marks them, a label; with ``z`` (m, n) a map over axes ``x`` (n,)
-    and ``y`` (m,)."""
+    """Hold points (n,), how matplotlib marks them, and a label; with ``z`` (m, n) a map over axes
+    ``x`` (n,) and ``y`` (m,)."""
 
     x: Array
     y: Array
@@ -52,7 +53,7 @@ class Curve(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """One pair of axes: name, start and end of each; curves; text at points; settings of
+    """Hold one pair of axes: name, start and end of each; curves; text at points; settings of
     matplotlib's axes."""
 
     x: tuple[str, float, float]
@@ -63,7 +64,8 @@ class Panel(NamedTuple):
 
 
 def _solve_border(y: NDArray[Any]) -> Array:
-    """Return v~crit and mu~ there at each amplitude (2, n), each a solve of the full model."""
+    """Return v~crit, and mu~ at v~crit, for each amplitude (2, n); each is a solve of the full
+    model."""
     return np.array([border(float(value)) for value in y]).T
 
 
@@ -85,7 +87,7 @@ def steady_cycle(v: float, y: float, steps: int = 2000) -> tuple[Array, Array, N
         Force of the spring over mu0 Fz [-], along and across the sliding direction, shape (steps,
         2).
     sticks : ndarray of bool
-        Whether the foot rests there, shape (steps,).
+        Whether the contact point rests there, shape (steps,).
 
     Examples
     --------
@@ -318,7 +320,7 @@ def _draw(panel: Panel, axes: Any) -> None:
 
 
 def _legend(figure: Any) -> None:
-    """One legend for all panels, below them: it covers no curve."""
+    """Draw one legend for all panels below them, so that it covers no curve."""
     handles: dict[str, Any] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -337,12 +339,12 @@ def draw_figures(surrogate: Surrogate, folder: Path) -> list[Path]:
     """Write every figure of :data:`FIGURES` to the existing ``folder`` as PNG, 792 x 528 pixels;
     return the paths.
 
-    ``surrogate`` is the table that the lines come from.  The same picture is the same bytes.
+    ``surrogate`` is the table for the lines.  The same picture has the same bytes.
 
     Raises
     ------
     MumacroError
-        Without matplotlib.
+        If matplotlib is not installed.
     """
     try:
         from cycler import cycler
@@ -363,6 +365,6 @@ def draw_figures(surrogate: Surrogate, folder: Path) -> list[Path]:
             figure.suptitle(title, x=0.01, ha="left", fontsize="medium")
             _legend(figure)
             paths.append(folder / f"{name}.png")
-            # no version of the drawing library in it
+            # without the version of the drawing library
             figure.savefig(paths[-1], dpi=DPI, metadata={"Software": None})
     return paths

@@ -1,1 +1,1 @@
-"""A table for other tools: C, FMU, a plain grid."""
+"""Export a table for other tools: C, FMU, a plain grid."""

@@ -1,8 +1,8 @@
-"""``--format c``: the evaluation's own C sources and a table as C text, in one header or in three
-files.
+"""Export with ``--format c``: the evaluation's own C sources and a table as C text, in one header
+or in three files.
 
-The functions are those of ``mumacro/kernel``, joined into one text; nothing is translated.  Of
-other packages this module needs only what the library itself needs.
+The functions are those of ``mumacro/kernel``, joined into one text; nothing is translated.  This
+module needs no packages beyond those of the library.
 """
 
 import re
@@ -19,7 +19,7 @@ from mumacro.table.blocks import Table, TabulatedContact
 from mumacro.table.polynomials import block_rows, border_cells, outer_cells, quantity_cells
 from mumacro.version import __version__
 
-#: picks the table that is exported by default: a C program holds all of its numbers as text
+#: tolerance of the table that is exported by default: a C program holds all of its numbers as text
 DEFAULT_TOLERANCE = 1e-7
 _KERNEL = Path(mumacro.__file__).parent / "kernel"
 _BANNER = f"/* Written by mumacro {__version__}; do not edit.  {{}}. */\n"
@@ -34,19 +34,19 @@ extern const mumacro_export mumacro_table;
 
 """
 _STATIC = "#ifndef MUMACRO_API\n#define MUMACRO_API static inline\n#endif\n"
-# Private names of the kernel, which a program may have, too, get a prefix; members of structs that
-# are named like this are public and keep their names.
+# Private names of the kernel get a prefix, because a program may have them, too.  Members of
+# structs with such a name are public and keep it.
 _PRIVATE = re.compile(r"\b(mu|MU)_(?!macro\b|ratio\b)(?=\w)")
 
 
 class ExportError(MumacroError):
-    """A table cannot be exported, or not to that place; the message states why, with the words of
-    the compiler where that failed."""
+    """Report that a table cannot be exported, or not to this place.  The message has the reason,
+    with the compiler's words if it failed."""
 
 
 def header_text(table: Table) -> str:
-    """Return all of it in one header, whose functions are static: it may be included in several
-    files of a program."""
+    """Return everything in one header.  Its functions are static, so several files of a program may
+    include it."""
     kernel = join_includes("kernel.c", set()) + table_text(table, "static ") + _file("interface.c")
     private = _PRIVATE.sub(lambda match: f"mumacro_{match[1]}_", kernel)
     banner = _BANNER.format("Declarations, the kernel, the table, the interface")
@@ -73,15 +73,15 @@ def files(table: Table) -> dict[str, str]:
 
 
 def write_c(table: Table, out: Path) -> list[Path]:
-    """Write one header where ``out`` ends in ``.h``, else three files into the folder ``out``;
+    """Write one header if ``out`` ends in ``.h``, otherwise three files into the folder ``out``;
     return the paths.
 
     Raises
     ------
     ExportError
-        ``out`` is neither a folder nor the name of a new one, or ends in ``.h`` and is a folder.
+        If ``out`` is neither a folder nor the name of a new one, or ends in ``.h`` and is a folder.
     OSError
-        It cannot be written.
+        If it cannot be written.
     """
     if out.suffix == ".h":
         if out.is_dir():
@@ -102,7 +102,7 @@ def write_c(table: Table, out: Path) -> list[Path]:
 
 
 def join_includes(name: str, file_names: set[str]) -> str:
-    """Return a file of the kernel with those that it includes, each once."""
+    """Return a file of the kernel with the files that it includes, each once."""
     file_names.add(name)
     lines = []
     for line in _file(name).splitlines(keepends=True):
@@ -138,7 +138,8 @@ def table_text(table: Table, linkage: str) -> str:
 
 
 def _contact_text(contact: TabulatedContact, table: Table, arrays: dict[str, Array]) -> str:
-    """Return the initializer of one contact's ``mumacro_data``, whose arrays are added."""
+    """Return the initializer of one contact's ``mumacro_data``, and add its arrays to
+    ``arrays``."""
     blocks = f"{contact.name}_blocks"
     arrays[blocks] = block_rows(contact)
     rows = [f"{len(arrays['border'])}, {_names('', ('border', 'pieces', blocks, 'outer'))}"]
@@ -169,7 +170,7 @@ def _names(prefix: str, parts: Iterable[str]) -> str:
 
 
 def _array(name: str, values: Array) -> str:
-    """Return eight numbers a line, each in the fewest digits that read back exactly."""
+    """Return eight numbers on a line, each with the fewest digits that read back exactly."""
     rows = values.reshape(-1, 8 if values.size % 8 == 0 else values.shape[-1]).tolist()
     lines = (",".join(map(_number, row)) for row in rows)
     return f"static const double {name}[{values.size}] = {{\n{f',{chr(10)}'.join(lines)}}};\n\n"

@@ -1,12 +1,13 @@
-"""A table in the formats of other tools: C sources, FMU; its plain grid as CSV.
+"""Export a table in the formats of other tools: C sources, FMU; its plain grid as CSV.
 
 The plain grid at the root of the file is exported: ``mu_ratio``, ``stick_fraction`` and
-``error_estimate`` over (``v_tilde``, ``y_tilde``), and ``v_tilde_crit`` over ``y_tilde``; all
-dimensionless.  It is a grid for tools with their own interpolation: its nodes are solved, between
-them such tools err as much as the table states of its plain grid.  The tolerance of the table is
-kept by :class:`mumacro.Surrogate` alone.
+``error_estimate`` over (``v_tilde``, ``y_tilde``), and ``v_tilde_crit`` over ``y_tilde``; all are
+dimensionless.  It is for tools with their own interpolation.  Its nodes are solved; between them
+such tools have the errors that the table states for its plain grid.  Only
+:class:`mumacro.Surrogate` keeps the tolerance of the table.
 
-Every file is written beside its name and then renamed, and the same table gives the same bytes.
+Every file is written under a temporary name and then renamed, and the same table gives the same
+bytes.
 """
 
 from collections.abc import Callable
@@ -26,7 +27,8 @@ PLANE = ("mu_ratio", "stick_fraction", "error_estimate")
 
 
 def long_columns(table: Table) -> dict[str, Array]:
-    """Return the grid with a row a node, ``y_tilde`` running fastest; columns (m n,) [-]."""
+    """Return the grid with one row for each node, ``y_tilde`` running fastest; columns (m n,)
+    [-]."""
     v, y, crit = np.broadcast_arrays(table.v_tilde[:, None], table.y_tilde, table.v_tilde_crit)
     plane = {name: np.asarray(getattr(table, name)) for name in PLANE}
     columns = {"v_tilde": v, "y_tilde": y, **plane, "v_tilde_crit": crit}
@@ -34,18 +36,18 @@ def long_columns(table: Table) -> dict[str, Array]:
 
 
 def grid_errors(table: Table) -> dict[str, float]:
-    """Return what tools err by that interpolate the grid, as the table names it."""
+    """Return the errors of tools that interpolate the grid, with the names of the table."""
     return {name: float(table.attributes[name]) for name in INTERPOLATION_ERRORS}
 
 
 def _csv(table: Table) -> bytes:
-    """RFC 4180, a header, a row a node; numbers with all their digits."""
+    """Return CSV (RFC 4180): a header, one row for each node, numbers with all their digits."""
     columns = long_columns(table)
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     return "".join(",".join(map(str, row)) + "\r\n" for row in (columns, *rows)).encode("ascii")
 
 
-#: format -> (name of the file after the table's, its content; C alone may be a folder of files)
+#: format -> (name of the file after the table's, its content; only C may be a folder of files)
 FORMATS: dict[str, tuple[str, Callable[[Table], bytes] | None]] = {
     "c": ("mumacro.h", None),
     "csv": ("{}.csv", _csv),
@@ -55,7 +57,7 @@ FORMATS: dict[str, tuple[str, Callable[[Table], bytes] | None]] = {
 
 
 def check_format(name: str) -> None:
-    """ExportError with the list of formats where ``name`` is none of them."""
+    """Raise ExportError with the list of formats if ``name`` is not one of them."""
     if name not in FORMATS:
         raise ExportError(f"format must be one of {', '.join(FORMATS)}, got {name!r}")
 
@@ -66,12 +68,12 @@ def export_table(path: str | Path, name: str, out: str | Path) -> Table:
     Raises
     ------
     ExportError
-        Unknown format, a compiler that fails, ``out`` is the table itself or no place for C
-        sources.
+        If the format is unknown, a compiler fails, or ``out`` is the table itself or not a place
+        for C sources.
     TableError
-        The table cannot be read.
+        If the table cannot be read.
     OSError
-        ``out`` cannot be written; an older file of that name is unchanged.
+        If ``out`` cannot be written; an older file of that name is unchanged.
     """
     check_format(name)
     path, out = Path(path), Path(out)

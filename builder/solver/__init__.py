@@ -1,1 +1,1 @@
-"""The full model: slip, stick and the steady cycle."""
+"""Solve the full model: slip, stick and the steady cycle."""

@@ -1,15 +1,15 @@
-"""The ball: a quadrature over its springs, which stand on a ray through the plane of one spring.
+"""Solve the ball: a quadrature over its springs, which are on a ray of the map of one spring.
 
-With V = v~/1.5 and Y = y~/1.5, which are those of the middle spring, that at the share xi of the
-contact radius has v~ = V/s and y~ = Y/s with s = 1 - xi^2:
+The middle spring has V = v~/1.5 and Y = y~/1.5.  The spring at the fraction xi of the contact
+radius has v~ = V/s and y~ = Y/s with s = 1 - xi^2:
 
     mu~(v~, y~) = 3/2 int_0^1 s mu~_spring(V/s, Y/s) d xi
 
-and the power has the factor 1.5 s more.  The ray is cut where a spring begins or ceases to stick
-and at y~ = 1, where the corner makes a step of the width (V/Y)^(2/3).  On every piece the rule of
-tanh and sinh crowds its points towards both ends, so that roots, logarithms and steps there cost
-nothing: it converges like exp(-c n / ln n) whatever they are.  A spring is the interpolant of a
-table that is finer than the one to be built, with 1 - mu~ known to its own digits.
+and the power has another factor 1.5 s.  The ray is cut where a spring begins or ceases to stick and
+at y~ = 1, where the corner makes a step of the width (V/Y)^(2/3).  On every piece the tanh-sinh
+rule crowds its points towards both ends, so that roots, logarithms and steps there do no harm: it
+converges like exp(-c n / ln n).  A spring is the interpolant of a table that is finer than the one
+to be built, with 1 - mu~ known to its own digits.
 """
 
 import itertools
@@ -25,22 +25,23 @@ from mumacro.table import atlas
 from mumacro.table.atlas import MIDDLE, STEEPEST, STEEPEST_Y
 
 CORNER = atlas.BLOCK_NAMES.index("corner")
-#: what a ball is solved for: every tabulated quantity, and 1 - mu~ with its own digits
+#: results of a ball: every tabulated quantity, and 1 - mu~ with its own digits
 NAMES = (*atlas.QUANTITY_NAMES, "deficit")
-#: what a spring adds in proportion to its length scale, too: s once more
+#: quantities of a spring that are also proportional to its length scale: one more factor s
 _WITH_LENGTH = ("power",)
-POINTS = 73  # on either side of the middle of a piece
-#: tolerance from which as many are enough
+POINTS = 73  # points on either side of the middle of a piece
+#: tolerance from which this number of points is enough
 FEWER_POINTS = {1e-5: 34, 1e-8: 46}
-LAST = 3.3  # of the rule's variable: beyond, weights are below 1e-17
-BISECTIONS = 62  # of an interval of less than e^64 to its last digit
-LONGEST = 4.0  # piece, in ln s
-#: springs that are evaluated together
+LAST = 3.3  # limit of the rule's variable: beyond it weights are below 1e-17
+BISECTIONS = 62  # from an interval of less than e^64 to its last digit
+LONGEST = 4.0  # longest piece, in ln s
+#: number of springs that are evaluated together
 TOGETHER = 100_000
 
 
 def _rule(points: int) -> tuple[Array, Array]:
-    """Of [0, 1]: the distances from the left end, ascending, and weights, both (2 points + 1,)."""
+    """Return for [0, 1] the distances from the left end, ascending, and weights, (2 points + 1,)
+    each."""
     t = np.linspace(-LAST, LAST, 2 * points + 1)
     turn = math.pi * np.sinh(t)
     share = 1.0 / (1.0 + np.exp(-turn))
@@ -49,17 +50,18 @@ def _rule(points: int) -> tuple[Array, Array]:
 
 
 def points_for(tolerance: float) -> int:
-    """Return points on either side with which a quadrature errs by far less than ``tolerance``."""
+    """Return the number of points on either side with which a quadrature error is far below
+    ``tolerance``."""
     return next((points for least, points in FEWER_POINTS.items() if tolerance >= least), POINTS)
 
 
 class Springs:
-    """One spring at many points from the table of ``fine``: :data:`NAMES`.
+    """Evaluate one spring at many points from the table of ``fine``: :data:`NAMES`.
 
     Raises
     ------
     TableError
-        The table is older than one of the quantities.
+        If the table is older than one of the quantities.
     """
 
     def __init__(self, fine: Surrogate) -> None:
@@ -69,14 +71,15 @@ class Springs:
             raise TableError(fine.path, reason)
         self.fine = fine
         for name in atlas.QUANTITY_NAMES:
-            self._data = fine.tabulated.data(name)  # one for all, which has the cells then
+            self._data = fine.tabulated.data(name)  # one object for all, which then has the cells
 
     def crit(self, y: Array) -> Array:
         """Return v~crit of one spring."""
         return self.fine.border(y)
 
     def __call__(self, v: Array, y: Array, eta: Array) -> dict[str, Array]:
-        """At points (n,) with v~, y~ > 0, finite; eta = y~ - 1 counts in the corner."""
+        """Return results at points (n,) with v~, y~ > 0, finite; eta = y~ - 1 is used in the
+        corner."""
         block, a, b = kernels[-1].places(self._data, v, y)
         i = np.flatnonzero(block == CORNER)
         a[i], b[i] = _corner(v[i], eta[i])
@@ -103,7 +106,8 @@ class Springs:
 
 
 def _corner(v: Array, eta: Array) -> tuple[Array, Array]:
-    """Return the corner's coordinates as evaluation has them, without a rounded y~ in between."""
+    """Return the corner's coordinates as the evaluation has them, without a rounded y~ in
+    between."""
     phi = kernels[-1].normal_form_root(v, eta)
     s0 = np.sqrt(2.0 * math.pi * v / phi)
     radius = np.sqrt(0.5 * s0 * s0 + 2.0 * phi * phi)
@@ -111,7 +115,7 @@ def _corner(v: Array, eta: Array) -> tuple[Array, Array]:
 
 
 def _fast_deficit(v: Array, y: Array) -> Array:
-    """Return 1 - mu~ for large v~, with the digits that it has."""
+    """Return 1 - mu~ for large v~, with its own digits."""
     share = 1.0 / (1.0 + v * v)
     r = y / np.hypot(1.0, v)
     n = np.square(np.minimum(r, 1.0))
@@ -132,7 +136,7 @@ def _mu_fast(expansion: Array, share: Array) -> Array:
 
 
 class Ball:
-    """Solves the ball at many points (V, Y) of its middle spring."""
+    """Solve the ball at many points (V, Y) of its middle spring."""
 
     def __init__(self, springs: Springs, points: int = POINTS, workers: int = 1) -> None:
         self.springs = springs
@@ -140,8 +144,8 @@ class Ball:
         self._share, self._weight = _rule(points)
 
     def crossings(self, ratio: Array) -> tuple[Array, Array]:
-        """Return y~ at which rays V/Y = ``ratio`` (n,), below the steepest, enter stick-slip and
-        leave it."""
+        """Return y~ at which rays V/Y = ``ratio`` (n,), below the steepest ray, enter stick-slip
+        and leave it."""
         steep = math.log(STEEPEST_Y)
         low, high = np.log(1.5 * ratio), np.full(ratio.shape, steep)
         entry = self._bisect(ratio, np.minimum(low, steep - 1e-9), high, 1.0)
@@ -158,7 +162,7 @@ class Ball:
 
     def _edges(self, v: Array, y: Array) -> Array:
         """Return values of s (n, edges), descending from 1 to 0, between which springs are smooth
-        and of like size."""
+        and of similar size."""
         ratio = v / y
         cuts = ratio < STEEPEST * (1.0 - 1e-15)
         entry, leave = self.crossings(np.where(cuts, ratio, 0.1))
@@ -166,10 +170,10 @@ class Ball:
         last = np.where(cuts, outer, np.maximum(v, y))
         width = np.minimum(3.0 * np.cbrt(ratio * ratio), 0.5)
         beyond = np.minimum(np.maximum(width, 3.0 * np.abs(y - 1.0)), 0.5)
-        # beyond the corner xi grows by ten from piece to piece
+        # beyond the corner xi grows by a factor of ten from piece to piece
         rising = (y / (1.0 + np.minimum(beyond * 100.0**i, 0.5)) for i in range(5))
         steps = (inner, y / (1.0 - width), y, y / (1.0 + width), *rising, last)
-        # those beyond the border's last crossing may be on this side of it, next to the ridge
+        # springs beyond the border's last crossing may be on this side of it, next to the ridge
         edges = -np.sort(-np.minimum([np.ones(v.shape), *steps], 1.0), axis=0)
         decades = [edges[0]]
         for above, below in itertools.pairwise(edges):
@@ -180,7 +184,7 @@ class Ball:
         return np.stack([*decades, np.zeros(v.shape)], axis=1)
 
     def solve(self, v: Array, y: Array, eta: Array | None = None) -> dict[str, Array]:
-        """Return :data:`NAMES` at V = ``v``, Y = ``y``, of one shape; eta = Y - 1."""
+        """Return :data:`NAMES` at V = ``v``, Y = ``y``, which have the same shape; eta = Y - 1."""
         v, y = np.broadcast_arrays(v, y)
         shape = v.shape
         eta = y - 1.0 if eta is None else np.broadcast_to(eta, shape)
@@ -195,7 +199,7 @@ class Ball:
 
     def _solve(self, v: Array, y: Array, eta: Array) -> Array:
         edges, out = self._edges(v, y), np.zeros((len(NAMES), v.size))
-        # xi and 1 - xi of the edges, each with its own digits; eta = y - 1 has those of s = y
+        # xi and 1 - xi of the edges, each with its own digits; eta = y - 1 has the digits of s = y
         at_corner = edges == y[:, None]
         complement = np.where(at_corner, -eta[:, None], 1.0 - edges)
         xi_of = np.sqrt(complement)
@@ -215,7 +219,7 @@ class Ball:
             xi = np.where(first_half, left + before, right - behind)
             rest = np.where(first_half & (left < 0.5), 1.0 - xi, last + behind)
             s = np.maximum(rest * (1.0 + xi), 1e-290)
-            # Y - s by the distance from the corner, where that is an edge, and beyond it
+            # Y - s from the distance to the corner if the corner is an edge, and beyond it
             excess = np.where(s > 0.01, eta[present, None] + xi * xi, np.inf)
             excess = np.where(at_corner[present, piece, None], before * (xi + left), excess)
             excess = np.where(at_corner[present, piece + 1, None], -behind * (xi + right), excess)

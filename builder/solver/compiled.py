@@ -1,4 +1,5 @@
-"""How the solver is compiled and kept, and the digest of everything that its results depend on."""
+"""Compile the solver and keep the result; compute a digest of everything on which its results
+depend."""
 
 import hashlib
 import os
@@ -22,7 +23,7 @@ SOURCES = (
 
 
 def source_digest() -> str:
-    """Digest of the sources of builder and evaluation and of the compiler: where it differs,
+    """Return a digest of the sources of builder and evaluation and of the compiler.  If it differs,
     numbers may differ."""
     compiler = (
         numba.__version__,
@@ -32,7 +33,7 @@ def source_digest() -> str:
     )
     h = hashlib.sha256(repr(compiler).encode())
     for folder, pattern in SOURCES:
-        # folders too: what is moved into one still counts
+        # folders too, because a file that is moved into one still counts
         for source in sorted(folder.rglob(pattern)):
             h.update(source.relative_to(folder).as_posix().encode())
             h.update(source.read_bytes())
@@ -40,10 +41,11 @@ def source_digest() -> str:
 
 
 def _store() -> Path | None:
-    """Folder of the functions that these sources compile to; None where none can be written.
+    """Return the folder of the functions that are compiled from these sources, or None if no folder
+    can be written.
 
-    numba's own store does not see a change in a function that another one calls, so each digest of
-    the sources has a folder: in ``NUMBA_CACHE_DIR``, else in the user's folder for caches.
+    numba's own store does not see a change in a function that another one calls.  So each digest of
+    the sources has a folder, in ``NUMBA_CACHE_DIR`` or else in the user's folder for caches.
     """
     if setting := os.environ.get("NUMBA_CACHE_DIR"):
         caches = Path(setting)
@@ -65,7 +67,7 @@ R = TypeVar("R")
 
 
 def solver_kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compiles a function at its first call, once for all processes where it can be kept.
+    """Compile a function at its first call, once for all processes if the result can be kept.
 
     It runs without the interpreter's lock and without fused multiply-add.
     """

@@ -1,5 +1,5 @@
-"""One stiff step of slip by Radau IIA collocation, with nodes, weights and derivatives from NumPy's
-Legendre series.
+"""Compute one stiff step of slip by Radau IIA collocation, with nodes, weights and derivatives from
+NumPy's Legendre series.
 
 Equations: Benad, Nakano, Popov, Popov (2018), (11), (12); symbols and charts as in :mod:`.slip`.
 """
@@ -17,8 +17,8 @@ STAGES = 20
 
 
 def _radau(n: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Nodes (n,) in (0, 1], weights (n,), and d/dc of the interpolant through (0, nodes) at the
-    nodes, (n, n + 1)."""
+    """Return nodes (n,) in (0, 1], weights (n,), and d/dc of the interpolant through (0, nodes) at
+    the nodes, (n, n + 1)."""
     series = np.array([0.0] * (n - 1) + [-1.0, 1.0])
     roots, slope = np.sort(legendre.legroots(series).real), legendre.legder(series)
     for _ in range(3):
@@ -50,9 +50,10 @@ RADAU_NODES, RADAU_WEIGHTS, RADAU_DIFF = _radau(STAGES)
 
 @solver_kernel
 def _solve_in_place(a: np.ndarray, b: np.ndarray) -> None:
-    """x of a x = b by elimination with row pivots, into ``b`` (n,); ``a`` (n, n) is lost.
+    """Solve a x = b by elimination with row pivots; write x into ``b`` (n,) and destroy ``a`` (n,
+    n).
 
-    In place of np.linalg.solve, which takes 5 s to compile and 3 times as long to run on 20
+    This replaces np.linalg.solve, which takes 5 s to compile and 3 times as long to run on 20
     unknowns.
     """
     n = b.size
@@ -95,12 +96,12 @@ def collocate(
     length: float,
     sums: np.ndarray,
 ) -> tuple[float, float]:
-    """Return one step of ``length`` [rad] from (sigma, chart base + x0), started on the slow
+    """Compute one step of ``length`` [rad] from (sigma, chart base + x0), started on the slow
     manifold tan th = y cos tau / v.
 
-    cos tau = sign sin sigma.  Adds the integrals of u_x, 1 - u_x, lam and y cos tau u_y to ``sums``
-    (4,).  Returns the local angle at the end [rad], NaN without convergence, and the smallest lam
-    at the nodes, at most 0.1 % above the one between them.
+    cos tau = sign sin sigma.  Add the integrals of u_x, 1 - u_x, lam and y cos tau u_y to ``sums``
+    (4,).  Return the local angle at the end [rad], NaN without convergence, and the smallest lam at
+    the nodes, which exceeds the smallest one between them by at most 0.1 %.
     """
     xs, c = np.empty(STAGES), np.empty(STAGES)
     for i in range(STAGES):

@@ -1,6 +1,6 @@
-"""The steady stick-slip cycle as a root on a one-dimensional section.
+"""Find the steady stick-slip cycle as a root on a one-dimensional section.
 
-Two sections are used, because neither is well conditioned everywhere:
+There are two sections, because neither is well conditioned everywhere:
 
 * the *angle section*: unknown th0, the angle at which slip stops (lam = 0 ties sigma0 to it); used
   from the border down and for y~ > 1;
@@ -27,8 +27,8 @@ BORDER_SLOPE: float = BORDER_CONSTANT**-0.5  # v~crit / sqrt(y~) for y~ -> infin
 NOT_CONVERGED = 10
 ANGLE_SECTION, TIME_SECTION = 0, 1
 
-# What a section leaves in ``orbit`` (6,): duration of stick [rad]; cos, 1 - cos and sin of the
-# angle th0 where slip stops; sigma where stick starts and where it ends, less pi [rad].
+# A section writes into ``orbit`` (6,): duration of stick [rad]; cos, 1 - cos and sin of the angle
+# th0 where slip stops; sigma where stick starts and where it ends, less pi [rad].
 DURATION, COS_0, DEFICIT_0, SIN_0, SIGMA_0, SIGMA_1 = range(6)
 
 
@@ -50,7 +50,7 @@ def _direction(x0: float, chart: int) -> tuple[float, float, float]:
 
 @solver_kernel
 def _keep(orbit: np.ndarray, duration: float, s0: float, s1: float, x0: float, chart: int) -> None:
-    """The stick phase into ``orbit`` (6,)."""
+    """Write the stick phase into ``orbit`` (6,)."""
     orbit[DURATION], orbit[SIGMA_0], orbit[SIGMA_1] = duration, s0, s1
     orbit[COS_0], orbit[SIN_0], orbit[DEFICIT_0] = _direction(x0, chart)
 
@@ -66,8 +66,8 @@ def _angle_section(
     out: np.ndarray,
     orbit: np.ndarray,
 ) -> tuple[float, int]:
-    """Return map's residual th_end - th0 [rad] and status, for slip that stops at th0 = base + x0;
-    in chart 1 x0 = -x.
+    """Return the map's residual th_end - th0 [rad] and a status, for slip that stops at th0 = base
+    + x0; in chart 1 x0 = -x.
 
     ``w`` and ``out`` as in :func:`.slip.slip`; ``orbit`` (6,) receives the stick phase.
     """
@@ -77,7 +77,7 @@ def _angle_section(
     if d < 0.0:
         return -1.0, slip_phase.NO_SLIP
     _keep(orbit, d, s0, s1, x0, chart)
-    # sigma1 counted from the nearer turn: after a short stick that is the one which slip came from
+    # sigma1 counted from the nearer turn: after a short stick it is the turn from which slip came
     turn = -1 if d < 0.5 * math.pi else 0
     near = s0 + d if turn < 0 else s1
     ux = cth + v * d
@@ -118,8 +118,8 @@ def _time_section(
     out: np.ndarray,
     orbit: np.ndarray,
 ) -> tuple[float, int]:
-    """Residual of the angle turned [rad] and status, for slip that starts at sigma1 = ``s1`` < 0
-    and closes the stick.
+    """Return the residual of the angle turned [rad] and a status, for slip that starts at sigma1 =
+    ``s1`` < 0 and closes the stick.
 
     With A, B = (th0 +- th1)/2 the stick phase closes where 2 sin A sin B = v (pi - slip duration)
     and sin A cos B = y cos((s0 + s1)/2) cos((s0 - s1)/2); both are explicit once sigma0 is known,
@@ -142,7 +142,7 @@ def _time_section(
             a_ang = math.asin(math.sqrt(ca2))
             th0 = a_ang - b
             ratio = v * math.tan(th0) / y
-        if not th0 > 0.0:  # NaN where slip cannot start there
+        if not th0 > 0.0:  # NaN if slip cannot start there
             return -1.0, slip_phase.NO_SLIP
         old, s0 = s0, math.asin(min(1.0, ratio))
         if abs(s0 - old) <= 1e-16 * abs(s0):
@@ -167,8 +167,8 @@ def section(
     out: np.ndarray,
     orbit: np.ndarray,
 ) -> tuple[float, int]:
-    """Residual [rad], increasing in the unknown z > 0 [rad] for every section and chart, and
-    status."""
+    """Return the residual [rad], which increases with the unknown z > 0 [rad] for every section and
+    chart, and a status."""
     if kind == ANGLE_SECTION:
         r, status = _angle_section(v, y, eta, z, chart, w, out, orbit)
         # in chart 0 the residual th_end - th0 falls with th0; delta = pi/2 - th0 turns the sign of
@@ -180,11 +180,11 @@ def section(
 
 @solver_kernel
 def _choose(v: float, y: float, eta: float, hint: float) -> tuple[int, int, float]:
-    """Section, chart and first guess of its unknown z [rad] from the limits; ``hint`` = th0 if
-    known, else NaN."""
+    """Return section, chart and a first guess of its unknown z [rad] from the limits; ``hint`` =
+    th0 if known, otherwise NaN."""
     ratio = v / border_guess(y)
-    # phi: the positive root of phi^3 - (1 - y^2) phi = pi v, the normal form of the corner and
-    # exact for v -> 0, y < 1
+    # phi: the positive root of phi^3 - (1 - y^2) phi = pi v, the normal form of the corner; exact
+    # for v -> 0, y < 1
     gap = -eta * (2.0 + eta)
     phi = math.sqrt(max(gap, 0.0)) + (math.pi * v) ** (1.0 / 3.0)
     for _ in range(60):
@@ -204,8 +204,8 @@ def _choose(v: float, y: float, eta: float, hint: float) -> tuple[int, int, floa
 
 @solver_kernel
 def _edge(v: float, y: float) -> float:
-    """Angle th0 [rad] below which no stick starts: lam = 0 = lam' there, (v / sin th)^2 = y sin th
-    cos sigma0."""
+    """Return the angle th0 [rad] below which no stick starts: lam = 0 = lam' there, (v / sin th)^2
+    = y sin th cos sigma0."""
     a, b = math.atan(v / y), 0.5 * math.pi
     for _ in range(60):
         m = 0.5 * (a + b)
@@ -222,10 +222,10 @@ def _edge(v: float, y: float) -> float:
 def stick_slip(
     v: float, y: float, eta: float, hint: float, w: np.ndarray, out: np.ndarray, orbit: np.ndarray
 ) -> int:
-    """Return steady stick-slip orbit into ``out`` and ``orbit`` by the bracketed secant method;
-    returns a status.
+    """Write the steady stick-slip orbit into ``out`` and ``orbit``, by the bracketed secant method;
+    return a status.
 
-    ``hint`` = th0 [rad] if something is known of it, as next to the border, else NaN.
+    ``hint`` = th0 [rad] if something is known about it, as next to the border, otherwise NaN.
     """
     kind, chart, z = _choose(v, y, eta, hint)
     near = kind == ANGLE_SECTION and not math.isnan(hint)
@@ -237,8 +237,8 @@ def stick_slip(
         f, status = section(kind, v, y, eta, z, chart, w, out, orbit)
         if status in (slip_phase.NO_SLIP, slip_phase.NO_STICK):
             # no slip: th0 too large, or sigma1 too close to zero.  No stick: next to the border
-            # slip misses lam = 0 when th0 is too large, since the half-period map turns the order
-            # of orbits round there
+            # slip misses lam = 0 if th0 is too large, because there the half-period map reverses
+            # the order of orbits
             lo, hi = (lo, z) if kind == ANGLE_SECTION and chart == FRONT else (z, hi)
             z, f_old = 0.5 * (lo + hi), math.inf
             continue
@@ -246,8 +246,8 @@ def stick_slip(
             return status
         lo, hi = (lo, z) if f > 0.0 else (z, hi)
         if f == 0.0 or spread * before < 1e-17:
-            # the secant method's error is about the product of its last two steps: this evaluation
-            # is the result
+            # the error of the secant method is about the product of its last two steps: this
+            # evaluation is the result
             return OK
         secant = f_old < math.inf and f != f_old
         if secant:
@@ -255,8 +255,8 @@ def stick_slip(
         elif f_old < math.inf:
             new = z
         elif kind == ANGLE_SECTION and (near or abs(f) > 1e-3 * z):
-            # the map contracts: its own image is the next trial; next to the border it also turns
-            # orbits round
+            # the map contracts, so its own image is the next trial; next to the border it also
+            # reverses orbits
             new = z - (0.6 * f if near else f)
         else:
             new = z * (0.98 if f > 0.0 else 1.02)
@@ -265,7 +265,7 @@ def stick_slip(
             new = 0.1 * hi if lo == 0.0 and trial < 40 else 0.5 * (lo + hi)
         if hi - lo <= 4e-16 * hi or new == z:
             return OK
-        # only a secant step shows how far the root still is
+        # only a secant step shows how far away the root still is
         before, spread = spread, abs(new - z) / abs(new) if secant else math.inf
         z_old, f_old, z = z, f, new
     return NOT_CONVERGED

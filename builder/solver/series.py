@@ -1,5 +1,4 @@
-"""Taylor series of the slip orbit over one step, and the operations on them: values, integrals,
-roots.
+"""Compute Taylor series of the slip orbit over one step, and their values, integrals and roots.
 
 Every polynomial is a row (ORDER + 2,) of the workspace ``w``, its coefficients in powers of the
 time [rad] since the start of the step.  Equations: Benad, Nakano, Popov, Popov (2018), (11), (12);
@@ -12,7 +11,8 @@ import numpy as np
 
 from .compiled import solver_kernel
 
-ORDER = 24  # of the Taylor series; 20 to 28 cost the same within 10 %, see benchmarks/solver.py
+# order of the Taylor series; 20 to 28 cost the same within 10 %, see benchmarks/solver.py
+ORDER = 24
 TRUNCATION = 2e-17  # last Taylor term relative to the increment over the step
 
 # Rows of ``w`` (9, ORDER + 2): x, sin x, 1 - cos x, x', C = cos tau, C sin x, C cos x, lam; lam' by
@@ -24,8 +24,8 @@ _INV = np.array([0.0] + [1.0 / k for k in range(1, ORDER + 3)])
 
 @solver_kernel
 def series(v: float, y: float, c0: float, c1: float, x: float, chart: int, w: np.ndarray) -> None:
-    """Taylor coefficients at one point of the slip orbit, eqs. (11), (12), into the rows of ``w``
-    (9, ORDER + 2).
+    """Write the Taylor coefficients at one point of the slip orbit, eqs. (11), (12), into the rows
+    of ``w`` (9, ORDER + 2).
 
     ``x`` [rad] is the local angle in ``chart``; c0, c1 [-] = cos tau and its derivative there.
     """
@@ -64,8 +64,8 @@ def series(v: float, y: float, c0: float, c1: float, x: float, chart: int, w: np
 
 @solver_kernel
 def increment(p: np.ndarray, t: float) -> float:
-    """Return p(t) - p(0), not a difference, of the Taylor coefficients ``p`` (ORDER + 2,) a time
-    ``t`` [rad] into the step."""
+    """Return p(t) - p(0), computed without a difference, from the Taylor coefficients ``p`` (ORDER
+    + 2,) at a time ``t`` [rad] into the step."""
     r: float = p[ORDER]
     for k in range(ORDER - 1, 0, -1):
         r = r * t + p[k]
@@ -74,14 +74,14 @@ def increment(p: np.ndarray, t: float) -> float:
 
 @solver_kernel
 def value(p: np.ndarray, t: float) -> float:
-    """Return p(t), as :func:`increment`."""
+    """Return p(t), in the way of :func:`increment`."""
     r: float = increment(p, t) + p[0]
     return r
 
 
 @solver_kernel
 def slope(p: np.ndarray, t: float) -> float:
-    """Return p'(t), as :func:`increment`."""
+    """Return p'(t), in the way of :func:`increment`."""
     r: float = ORDER * p[ORDER]
     for k in range(ORDER - 1, 0, -1):
         r = r * t + k * p[k]
@@ -90,7 +90,7 @@ def slope(p: np.ndarray, t: float) -> float:
 
 @solver_kernel
 def integral(p: np.ndarray, t: float) -> float:
-    """Integral of p from 0 to ``t``, as :func:`increment`."""
+    """Return the integral of p from 0 to ``t``, in the way of :func:`increment`."""
     r: float = p[ORDER] * _INV[ORDER + 1]
     for k in range(ORDER - 1, -1, -1):
         r = r * t + p[k] * _INV[k + 1]
@@ -99,7 +99,7 @@ def integral(p: np.ndarray, t: float) -> float:
 
 @solver_kernel
 def integral_of_product(p: np.ndarray, q: np.ndarray, t: float) -> float:
-    """Integral of p q from 0 to ``t``, to the order of the series."""
+    """Return the integral of p q from 0 to ``t``, to the order of the series."""
     r = 0.0
     for k in range(ORDER, -1, -1):
         c = 0.0
@@ -111,10 +111,11 @@ def integral_of_product(p: np.ndarray, q: np.ndarray, t: float) -> float:
 
 @solver_kernel
 def root(p: np.ndarray, lo: float, hi: float) -> float:
-    """Return root of p in [lo, hi], where the sign changes: Newton kept inside the bracket."""
+    """Return the root of p in [lo, hi], where the sign changes, by Newton's method kept inside the
+    bracket."""
     up = value(p, hi) > 0.0
     t = 0.5 * (lo + hi)
-    # the window of slip may be as short as 1e-30: bisection alone must get there
+    # the window of slip may be as short as 1e-30: bisection alone must find it
     for _ in range(300):
         f = value(p, t)
         lo, hi = (lo, t) if (f > 0.0) == up else (t, hi)
@@ -130,7 +131,7 @@ def root(p: np.ndarray, lo: float, hi: float) -> float:
 
 @solver_kernel
 def derivative(p: np.ndarray, q: np.ndarray) -> None:
-    """p' into ``q``."""
+    """Write p' into ``q``."""
     for k in range(ORDER):
         q[k] = (k + 1) * p[k + 1]
     q[ORDER] = 0.0
@@ -138,11 +139,11 @@ def derivative(p: np.ndarray, q: np.ndarray) -> None:
 
 @solver_kernel
 def step_length(w: np.ndarray, layer: float, lam: float) -> float:
-    """Step [rad] for which the last terms are below TRUNCATION and the explicit series stays stable
-    at ``lam`` [-].
+    """Return the step [rad] for which the last terms are below TRUNCATION and the explicit series
+    stays stable at ``lam`` [-].
 
-    Where x' passes zero the increment is judged by x'' and the time ``layer`` [rad], at most that
-    of the layers.
+    Where x' passes zero, x'' and the time ``layer`` [rad] (at most the width of the layers) limit
+    the increment.
     """
     x, h = w[X], 0.9
     scale = max(abs(x[1]), layer * abs(x[2]))

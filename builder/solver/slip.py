@@ -1,12 +1,12 @@
-"""Equations of motion of one half period of slip, and where it ends.
+"""Define the equations of motion of one half period of slip, and find where it ends.
 
 Time is sigma = tau - pi/2, so that the shaker turns at sigma = 0 and cos tau = -sin sigma is exact
-near the turn. The foot's deflection during slip is u = (cos th, sin th).  Angles are kept in one of
-three charts, th = base + x with base 0, +pi/2 or -pi/2 (chart 0, +1, -1), so that whichever of u_x,
-u_y, 1 - u_x is small keeps all its digits.  Source of the equations: Benad, Nakano, Popov, Popov
+near the turn.  The elongation during slip is u = (cos th, sin th).  Angles are kept in one of three
+charts, th = base + x with base 0, +pi/2 or -pi/2 (chart 0, +1, -1), so that whichever of u_x, u_y,
+1 - u_x is small keeps all its digits.  The equations are those of Benad, Nakano, Popov, Popov
 (2018), eqs. (9)-(12), (15).
 
-Everything here is compiled; arguments are float64 scalars, dimensionless: v = v~, y = y~.
+Everything in this module is compiled; arguments are float64 scalars, dimensionless: v = v~, y = y~.
 """
 
 import math
@@ -19,10 +19,11 @@ from .compiled import solver_kernel
 from .radau import collocate
 
 STIFF = 60.0  # relaxation lengths in a step from which collocation is cheaper than Taylor steps
-# relaxation lengths after which a start has decayed below rounding, exp(-38) = 3e-17
+# number of relaxation lengths after which the initial state has decayed below rounding, exp(-38) =
+# 3e-17
 FORGOTTEN = 38.0
 MAX_STEPS = 10_000
-# v~, y~ below both of which EXCESS is followed; u stays in chart 0, stick included
+# below these v~ and y~ EXCESS is followed; u stays in chart 0, stick included
 SMALL_V, SMALL_Y = 0.05, 0.3
 
 OK = 0
@@ -31,16 +32,16 @@ NO_STICK = 2  # slip does not end within a period
 TOO_MANY_STEPS = 3
 DIVERGED = 4  # collocation did not converge
 
-# What slip leaves in ``out`` (12,): sigma [rad], local angle x [rad] and chart where it ended;
+# Slip writes into ``out`` (12,): sigma [rad], local angle x [rad] and chart where it ended;
 # increment of the angle [rad]; integrals over sigma of u_x, 1 - u_x, lam (the slip path in l0) and
 # y~ cos tau u_y (the shaker's work); the smallest lam; angle th [rad] where lam first falls below
-# zero, else NaN; steps; integral of lam (1 - u_x).
+# zero, otherwise NaN; steps; integral of lam (1 - u_x).
 SIGMA, ANGLE, CHART, TURNED, SUM_UX, SUM_DEFICIT, PATH, WORK, MIN_SPEED, FALL, STEPS, EXCESS = (
     range(12)
 )
 
-# Arguments of slip.  NumPy scalars, because numba compiles a function again for every literal int
-# and bool.
+# Arguments of slip.  They are NumPy scalars, because numba compiles a function again for every
+# literal int and bool.
 HERE: Any = np.int64(0)  # time counts from the turn of the shaker at sigma = 0
 FRONT: Any = np.int64(0)  # chart of small angles
 SIDE: Any = np.int64(1)  # chart of angles next to pi/2
@@ -50,17 +51,17 @@ ALL_THE_WAY: Any = np.bool_(False)
 
 @solver_kernel
 def rechart(x: float, chart: int, target: int) -> float:
-    """Local angle of the same direction in another chart [rad]."""
+    """Return the local angle of the same direction in another chart [rad]."""
     return x + (chart - target) * (0.5 * math.pi)
 
 
 @solver_kernel
 def _standstill(w: np.ndarray, h: float, out: np.ndarray) -> float:
-    """Time [rad] within the step ``h`` at which lam falls below zero, -1 if it does not; follows
-    the smallest lam.
+    """Return the time [rad] within the step ``h`` at which lam falls below zero, -1 if it does not;
+    update the smallest lam.
 
-    Next to the border lam is negative for a moment between two positive ends: the minimum is found
-    first.
+    Next to the border lam is negative for a moment between two positive ends, so the minimum is
+    found first.
     """
     lam, rate, stop = w[series.SPEED], w[series.SPEED_RATE], -1.0
     end, s0, s1 = series.value(lam, h), lam[1], series.slope(lam, h)
@@ -76,7 +77,7 @@ def _standstill(w: np.ndarray, h: float, out: np.ndarray) -> float:
     if stop < 0.0 and end < 0.0:
         if lam[0] > 0.0:
             stop = series.root(lam, 0.0, h)
-        elif s0 > 0.0:  # rises from zero first: the crossing lies beyond the maximum
+        elif s0 > 0.0:  # rises from zero first: the crossing is beyond the maximum
             t = series.root(rate, 0.0, h) if s1 < 0.0 else h
             stop = series.root(lam, t, h) if series.value(lam, t) > 0.0 else 0.0
         else:
@@ -88,7 +89,7 @@ def _standstill(w: np.ndarray, h: float, out: np.ndarray) -> float:
 def _add_integrals(
     y: float, chart: int, h: float, excess: bool, w: np.ndarray, out: np.ndarray
 ) -> None:
-    """Integrals over a Taylor step of length ``h`` [rad] into ``out``; EXCESS only if
+    """Add the integrals over a Taylor step of length ``h`` [rad] to ``out``; EXCESS only if
     ``excess``."""
     if chart == FRONT:
         d = series.integral(w[series.DEFICIT_X], h)
@@ -107,11 +108,11 @@ def _add_integrals(
 
 @solver_kernel
 def _stiff_length(sigma: float, ratio: float, remaining: float) -> float:
-    """Length of a collocation step [rad] from ``sigma``: the turn's layer is ``ratio`` = v~/y~
-    [rad] wide."""
+    """Return the length of a collocation step [rad] from ``sigma``; the turn's layer is ``ratio`` =
+    v~/y~ [rad] wide."""
     gap = math.hypot(sigma, ratio) if ratio < 1.0 else 1.0
-    # away from the turn behind a step may be as long as the way back to it; towards the next one
-    # half the way to it
+    # after a turn a step may be as long as the distance from it; before the next turn half of the
+    # distance to it
     ahead = 0.5 * (math.pi - sigma) if sigma > 0.0 else 0.5 * gap
     return min(gap, max(ahead, 0.5 * gap) if sigma > 0.0 else ahead, remaining, 0.8)
 
@@ -129,20 +130,20 @@ def slip(
     w: np.ndarray,
     out: np.ndarray,
 ) -> int:
-    """Slip orbit, eq. (11), from (sigma + turn pi, chart base + x) to ``end``, or to the first lam
-    = 0 if ``to_stick``.
+    """Follow the slip orbit, eq. (11), from (sigma + turn pi, chart base + x) to ``end``, or to the
+    first lam = 0 if ``to_stick``.
 
     ``turn`` is 0 or -1: time counts from the nearer turn of the shaker, whose layers are as thin as
-    1/sqrt(y~). ``w`` (9, ORDER + 2) is workspace; ``out`` (12,) receives the end and the integrals.
-    Returns a status.
+    1/sqrt(y~).  ``w`` (9, ORDER + 2) is workspace; ``out`` (12,) receives the end and the
+    integrals.  Return a status.
     """
     out[TURNED:MIN_SPEED] = 0.0
     out[MIN_SPEED], out[FALL], out[EXCESS] = math.inf, math.nan, 0.0
     ratio, layer, steps = v / y, min(0.3, 10.0 / math.sqrt(y)), 0
     while steps <= MAX_STEPS:
         if abs(x) > 0.9:
-            # a quarter turn back from chart +-1 leads to 0; further than that leaves the half plane
-            # u_x > 0
+            # a quarter turn back from chart +-1 leads to 0; a larger one leaves the half plane u_x
+            # > 0
             target = (1 if x > 0.0 else -1) if chart == FRONT else 0
             x, chart = rechart(x, chart, target), target
         if turn < 0 and sigma > 0.5 * math.pi:

@@ -1,13 +1,14 @@
-"""The steady cycle at one (v~, y~) by root-finding on half a period; never by marching cycles.
+"""Find the steady cycle at one (v~, y~) by root-finding on half a period, never by following
+cycles.
 
-Continuous sliding is a fixed point of the half-period map, th(tau + pi) = -th(tau), found by
-Newton's method with d th_end / d th_start = exp(-integral of lam).  Stick-slip is a root on a
+Continuous sliding is a fixed point of the half-period map, th(tau + pi) = -th(tau).  Newton's
+method finds it with d th_end / d th_start = exp(-integral of lam).  Stick-slip is a root on a
 section, :mod:`.sections`.
 
-The solver's range is 1e-60 <= v~ <= 1e10, 1e-15 <= y~ <= 1e14; beyond it :func:`check_range`
-refuses.  Below it products underflow.  Above y~ = 1e14 the section's root is lost in rounding, and
-at v~ = 1e12 some points need too many steps.  The limits of the model hold to rounding there, so a
-table answers for every v~ and y~.
+The solver's range is 1e-60 <= v~ <= 1e10, 1e-15 <= y~ <= 1e14; outside it :func:`check_range`
+refuses.  Below it products underflow.  Above y~ = 1e14 rounding hides the section's root, and at v~
+= 1e12 some points need too many steps.  There the limits of the model hold to rounding, so a table
+answers for every v~ and y~.
 """
 
 import math
@@ -50,8 +51,8 @@ ADVICE = {
     NOT_CONVERGED: "the section's root was not found to rounding: " + _LOST,
 }
 
-#: results of solve_raw in ``res``, named as in Steady; those before the regime are columns of a
-#: sweep
+#: results of solve_raw in ``res``, with the names of Steady; those before the regime are columns of
+#: a sweep
 RESULTS = (
     "mu_ratio",
     "deficit",
@@ -66,25 +67,26 @@ MU_RATIO, DEFICIT, STICK_FRACTION, POWER, REGIME, SLIP_SPEED, MIN_SLIP_SPEED = r
 )
 
 V_RANGE, Y_RANGE = (1e-60, 1e10), (1e-15, 1e14)  # of v~ and y~, dimensionless
-MEAN = 1.0 / math.pi  # of an integral over half a period
+MEAN = 1.0 / math.pi  # mean of an integral over half a period
 RELATIVE_ERROR = 3e-15  # of the smaller of mu~ and 1 - mu~, see error_estimate
 
 
 @solver_kernel
 def error_estimate(mu: float, deficit: float) -> float:
-    """Largest absolute error of mu~ [-] to be expected; mu~ and 1 - mu~ are solved for.
+    """Return the largest absolute error of mu~ [-] to be expected; the solver finds both mu~ and 1
+    - mu~.
 
-    No larger one was found to points in quadruple precision, between neighbouring doubles and to
-    the laws at the ends of the range: test_steady.py and test_extremes.py in tests/builder/solver
-    look.
+    No larger error was found in comparison with points in quadruple precision, between neighbouring
+    doubles, and with the laws at the ends of the range: see test_steady.py and test_extremes.py in
+    tests/builder/solver.
     """
     return RELATIVE_ERROR * min(mu, deficit) + 2.3e-16 * mu + 5e-324
 
 
 @solver_kernel
 def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
-    """Continuous orbit over sigma in [-pi/2, pi/2], eq. (11); ``w`` and ``out`` as in
-    :func:`.slip.slip`; a status."""
+    """Follow the continuous orbit over sigma in [-pi/2, pi/2], eq. (11); ``w`` and ``out`` as in
+    :func:`.slip.slip`.  Return a status."""
     th, half, is_last = math.atan(v * y / (1.0 + v * v)), 0.5 * math.pi, False
     for _ in range(60):
         chart = 1 if th > 0.75 else 0
@@ -93,7 +95,7 @@ def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
         if status != OK:
             return status
         x_end, chart_end = out[slip_phase.ANGLE], int(out[slip_phase.CHART])
-        # residual th_end + th_start, formed in the mirrored chart so that small angles keep their
+        # residual th_end + th_start, computed in the mirrored chart so that small angles keep their
         # digits
         res = rechart(x_end, chart_end, -chart) + x
         if is_last:
@@ -113,8 +115,8 @@ def continuous(v: float, y: float, w: np.ndarray, out: np.ndarray) -> int:
 
 @solver_kernel
 def border_raw(y: float, w: np.ndarray, out: np.ndarray) -> tuple[float, float, int]:
-    """Return (v~crit, mu~ there, status): where the smallest slip speed of the continuous orbit
-    reaches zero."""
+    """Return (v~crit, mu~ at v~crit, status): at v~crit the smallest slip speed of the continuous
+    orbit is zero."""
     guess = border_guess(y)
     lo, hi = 0.7 * guess, 1.4 * guess
     z, z_old, f_old = 1.02 * guess, 0.0, math.inf
@@ -142,8 +144,8 @@ def border_raw(y: float, w: np.ndarray, out: np.ndarray) -> tuple[float, float, 
 
 @solver_kernel
 def _finish(v: float, y: float, regime: int, out: np.ndarray, res: np.ndarray) -> None:
-    """The rest of the results (7,): of mu~ and 1 - mu~ the smaller has the digits; the slip speed;
-    a small power."""
+    """Write the rest of the results (7,): the smaller of mu~ and 1 - mu~ has the digits; the slip
+    speed; a small power."""
     res[REGIME], res[SLIP_SPEED], res[MIN_SLIP_SPEED] = (
         regime,
         out[slip_phase.PATH] * MEAN,
@@ -154,14 +156,15 @@ def _finish(v: float, y: float, regime: int, out: np.ndarray, res: np.ndarray) -
     else:
         res[DEFICIT] = 1.0 - res[MU_RATIO]
     if v < slip_phase.SMALL_V and y < slip_phase.SMALL_Y:
-        # <lam> - v~ mu~ with nothing subtracted: <lam u_x> = v~ is the foot's mean velocity along
-        # the drive
+        # <lam> - v~ mu~ without a subtraction: <lam u_x> = v~ is the mean velocity of the contact
+        # point along the drive
         res[POWER] = out[slip_phase.EXCESS] / math.pi + v * res[DEFICIT]
 
 
 @solver_kernel
 def sliding(v: float, y: float, out: np.ndarray, res: np.ndarray) -> None:
-    """Results (7,) of continuous sliding from what :func:`continuous` left in ``out``, eq. (15)."""
+    """Write the results (7,) of continuous sliding from what :func:`continuous` wrote into ``out``,
+    eq. (15)."""
     res[MU_RATIO], res[DEFICIT] = out[slip_phase.SUM_UX] * MEAN, out[slip_phase.SUM_DEFICIT] * MEAN
     res[STICK_FRACTION], res[POWER] = 0.0, out[slip_phase.WORK] * MEAN
     _finish(v, y, CONTINUOUS, out, res)
@@ -169,12 +172,12 @@ def sliding(v: float, y: float, out: np.ndarray, res: np.ndarray) -> None:
 
 @solver_kernel
 def _sticking(v: float, y: float, out: np.ndarray, orbit: np.ndarray, res: np.ndarray) -> None:
-    """Results (7,) of stick-slip from what :func:`stick_slip` left in ``out`` and ``orbit``, eq.
-    (15)."""
+    """Write the results (7,) of stick-slip from what :func:`stick_slip` wrote into ``out`` and
+    ``orbit``, eq. (15)."""
     d, cth, deficit = orbit[DURATION], orbit[COS_0], orbit[DEFICIT_0]
-    # Next to the border lam grazes zero and the end of slip is known to 1e-16/sqrt(1 - v~/v~crit)
-    # only; the state there is known far better, so the surplus is taken out and stick and slip
-    # together last exactly half a period.
+    # Next to the border lam grazes zero, and the end of slip is known only to 1e-16/sqrt(1 -
+    # v~/v~crit).  The state there is known far better, so the surplus is removed, and stick and
+    # slip together last exactly half a period.
     surplus = out[slip_phase.SIGMA] - orbit[SIGMA_0]
     out[slip_phase.SUM_UX] -= surplus * cth
     out[slip_phase.SUM_DEFICIT] -= surplus * deficit
@@ -200,8 +203,8 @@ def solve_raw(
     orbit: np.ndarray,
     res: np.ndarray,
 ) -> int:
-    """Return steady state at v~ = ``v``, y~ = ``y``, eta = y~ - 1 [-] into ``res`` (7,); the rest
-    is workspace; a status."""
+    """Write the steady state at v~ = ``v``, y~ = ``y``, eta = y~ - 1 [-] into ``res`` (7,); the
+    other arguments are workspace.  Return a status."""
     res[:] = math.nan
     hint = least = math.nan
     if v > 0.75 * border_guess(y):
@@ -216,8 +219,8 @@ def solve_raw(
             _sticking(v, y, out, orbit, res)
             res[MIN_SLIP_SPEED] = least
             return OK
-        # the last digit below the border: the section ends where its root lies, and the two orbits
-        # are one to rounding
+        # the last digit below the border: the section ends at its root, and the two orbits agree to
+        # rounding
         if not least > -1e-13 * v or continuous(v, y, w, out) != OK:
             return status
     sliding(v, y, out, res)
@@ -226,41 +229,41 @@ def solve_raw(
 
 @dataclass(frozen=True)
 class Steady:
-    """Steady cycle at one (v~, y~); every quantity dimensionless."""
+    """Hold the steady cycle at one (v~, y~); every quantity is dimensionless."""
 
     #: mu~ = mu_macro/mu0 = <u_x>, eq. (15), and 1 - mu~ with its own full precision
     mu_ratio: float
     deficit: float
     #: "continuous" or "stick_slip"
     regime: str
-    #: share of the period during which the foot sticks
+    #: fraction of the period during which the contact point sticks
     stick_fraction: float
     #: <y~ cos tau u_y>: mean power of the shaker in units of mu0 Fz l0 omega
     power: float
     #: <lam>: mean slip path per radian in units of l0; equals v~ mu~ + power
     slip_speed: float
     #: smallest lam of the continuous orbit; NaN far below the border, where it is not followed;
-    #: right to 0.1 % where v~ is so far above the border that stiff steps pass it by
+    #: right to 0.1 % if v~ is so far above the border that stiff steps pass it
     min_slip_speed: float
     #: largest absolute error of mu_ratio to be expected, see error_estimate()
     error_estimate: float
-    #: 0 when solved; what it means and what to do
+    #: 0 if solved; what the status means and what to do
     status: int
     advice: str
 
     @property
     def ok(self) -> bool:
-        """True when the steady cycle was found."""
+        """Return whether the steady cycle was found."""
         return self.status == OK
 
 
 def check_range(v: ArrayLike, y: ArrayLike, eta: ArrayLike) -> None:
-    """Refuse v~, y~ or eta = y~ - 1 [-], arrays of one shape, that the solver is not made for.
+    """Refuse v~, y~ or eta = y~ - 1 [-], arrays of one shape, outside the range of the solver.
 
     Raises
     ------
     InputError
-        A value out of range or NaN; an ``eta`` that is not y~ - 1 to rounding.
+        If a value is out of range or NaN, or ``eta`` differs from y~ - 1 by more than rounding.
     """
     v, y, eta = (np.asarray(values, dtype=np.float64) for values in (v, y, eta))
     for field, values, (low, high) in (("v_tilde", v, V_RANGE), ("y_tilde", y, Y_RANGE)):
@@ -283,8 +286,8 @@ def _refuse(field: str, values: NDArray[np.float64], right: NDArray[np.bool_], b
 
 @solver_kernel
 def workspace() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return arrays ``w``, ``out``, ``orbit``, ``res`` that :func:`solve_raw` writes to; one set
-    per thread."""
+    """Return arrays ``w``, ``out``, ``orbit``, ``res`` to which :func:`solve_raw` writes; each
+    thread needs its own set."""
     return np.zeros((9, ORDER + 2)), np.zeros(12), np.zeros(6), np.zeros(N_RESULTS)
 
 
@@ -297,7 +300,7 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
         Dimensionless speed and amplitude [-], in ``builder.solver.steady.V_RANGE`` and
         ``builder.solver.steady.Y_RANGE``.
     eta : float, optional
-        y~ - 1 [-], to be given where it is known better than ``y`` in double precision.
+        y~ - 1 [-], if it is known better than ``y`` in double precision.
 
     Returns
     -------
@@ -307,7 +310,7 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
     Raises
     ------
     InputError
-        A value out of range.
+        If a value is out of range.
 
     Examples
     --------
@@ -326,15 +329,15 @@ def solve(v: float, y: float, eta: float | None = None) -> Steady:
 
 
 def border(y: float) -> tuple[float, float]:
-    """Return border of continuous sliding: (v~crit, mu~ on it) at the amplitude y~ = ``y`` [-] in
-    ``builder.solver.steady.Y_RANGE``.
+    """Return the border of continuous sliding: (v~crit, mu~ on it) at the amplitude y~ = ``y`` [-]
+    in ``builder.solver.steady.Y_RANGE``.
 
     Raises
     ------
     InputError
-        An amplitude out of range.
+        If the amplitude is out of range.
     ArithmeticError
-        When the root-finder fails.
+        If the root-finder fails.
     """
     y = float(y)
     check_range(1.0, y, y - 1.0)

@@ -1,8 +1,9 @@
-"""The stick phase in closed form: the time at which the spring reaches the friction limit again.
+"""Compute the stick phase in closed form: the time at which the spring reaches the friction limit
+again.
 
-During stick u moves with the upper point, eqs. (9), (10): |u|^2 - 1 is explicit in the time, its
-first root ends it. Time is sigma = tau - pi/2 [rad]; v = v~ [-], y = y~ [-], eta = y~ - 1 [-];
-angles of u as in :mod:`.slip`.
+During stick u moves with the upper point, eqs. (9), (10): |u|^2 - 1 is explicit in the time, and
+its first root ends stick.  Time is sigma = tau - pi/2 [rad]; v = v~ [-], y = y~ [-], eta = y~ - 1
+[-]; angles of u are as in :mod:`.slip`.
 """
 
 import math
@@ -38,8 +39,8 @@ def stick_excess(
     """Return (|u|^2 - 1) / d^2 [-] a time ``d`` [rad] after slip stopped at (s0, chart base + x0);
     s1 = s0 + d - pi.
 
-    The double root at d = 0 is divided out with lam = 0 at the onset; at d = 0 this is d lam/d tau
-    there.
+    The double root at d = 0 is divided out with lam = 0 at the onset; at d = 0 the result is d
+    lam/d tau there.
     """
     half = _sinc(0.5 * d)
     h2 = half * half
@@ -68,9 +69,10 @@ def _chandrupatla(
     fb: float,
     in_sigma: bool,
 ) -> float:
-    """Return root of stick_excess in d, or in sigma1 if ``in_sigma``, between a and b [rad].
+    """Return the root of stick_excess in d, or in sigma1 if ``in_sigma``, between a and b [rad].
 
-    Chandrupatla's bracketed inverse interpolation (Advances in Engineering Software 28, 1997).
+    The method is Chandrupatla's bracketed inverse interpolation (Advances in Engineering Software
+    28, 1997).
     """
     x1, f1, x2, f2, x3, f3 = b, fb, a, fa, a, fa
     t = 0.5
@@ -102,8 +104,8 @@ def _chandrupatla(
 def _reached(
     v: float, y: float, eta: float, x0: float, chart: int, s0: float
 ) -> tuple[float, float]:
-    """Two times since the onset of stick [rad], |u| < 1 at the first, > 1 at the second; (0, -1) if
-    it stays below."""
+    """Return two times since the onset of stick [rad], |u| < 1 at the first, > 1 at the second; (0,
+    -1) if it stays below."""
     d = 0.0
     for i in range(1, SCAN + 1):
         lo, d = d, math.pi * i / SCAN
@@ -127,8 +129,8 @@ def _reached(
 def stick_end(
     v: float, y: float, eta: float, x0: float, chart: int, s0: float
 ) -> tuple[float, float]:
-    """Duration of stick and sigma at its end, less pi [rad]; (-1, 0) if the limit is not reached in
-    half a period."""
+    """Return the duration of stick, and sigma at its end, less pi [rad]; (-1, 0) if the limit is
+    not reached in half a period."""
     lo, hi = _reached(v, y, eta, x0, chart, s0)
     if hi < 0.0:
         return -1.0, 0.0

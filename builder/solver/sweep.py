@@ -1,7 +1,7 @@
-"""Nodes to solved values, in parallel.
+"""Solve nodes in parallel.
 
-Work is cut into chunks of points; a chunk is a pure function of its inputs, so the values do not
-depend on how many workers there are.
+Work is cut into chunks of points.  A chunk is a pure function of its inputs, so the values do not
+depend on the number of workers.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -28,7 +28,7 @@ _MU, _DEFICIT, _ERROR, _STATUS = map(
 
 
 class SolveError(MumacroError):
-    """A node could not be solved; the message states which and what to do."""
+    """Report a node that could not be solved; the message says which one and what to do."""
 
 
 @solver_kernel
@@ -51,7 +51,7 @@ def _solve_rows(kind: int, points: Array, out: Array) -> None:
 
 
 def solve_chunk(kind: str, points: Array) -> Array:
-    """Solve ``points`` (n, 3) of v~, y~, y~ - 1 as one of :data:`KINDS`; rows of
+    """Solve ``points`` (n, 3) of v~, y~, y~ - 1 as one of :data:`KINDS`; return rows of
     :data:`COLUMNS`."""
     out = np.empty((points.shape[0], len(COLUMNS)))
     _solve_rows(KINDS[kind], np.ascontiguousarray(points), out)
@@ -59,8 +59,8 @@ def solve_chunk(kind: str, points: Array) -> Array:
 
 
 class Sweep:
-    """Solves arrays of points, in so many threads (the solver releases the interpreter lock), and
-    counts them."""
+    """Solve arrays of points in several threads (the solver releases the interpreter lock), and
+    count them."""
 
     def __init__(self, workers: int = 1) -> None:
         self.n_solves = 0
@@ -74,17 +74,16 @@ class Sweep:
         self._pool.shutdown(cancel_futures=True)
 
     def solve(self, kind: str, v: Array, y: Array, eta: Array | None = None) -> dict[str, Array]:
-        """Solve at every (v~, y~); returns arrays of the broadcast shape by name of
-        :data:`COLUMNS`.
+        """Solve at every (v~, y~); return arrays of the broadcast shape by name of :data:`COLUMNS`.
 
-        ``eta`` = y~ - 1 may be given where it is known better than ``y``.
+        Give ``eta`` = y~ - 1 if it is known better than ``y``.
 
         Raises
         ------
         InputError
-            A point outside the solver's range, :mod:`.steady`.
+            If a point is outside the solver's range, :mod:`.steady`.
         SolveError
-            When any point fails: a table must have no missing node.
+            If any point fails, because a table must have no missing node.
         """
         v, y = np.broadcast_arrays(np.asarray(v, dtype=np.float64), np.asarray(y, dtype=np.float64))
         eta = (

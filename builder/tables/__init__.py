@@ -1,1 +1,1 @@
-"""From solved points to a verified table."""
+"""Make a verified table from solved points."""

@@ -1,4 +1,4 @@
-"""Nodes of a block, and their refinement until the interpolant meets the tolerance."""
+"""Choose nodes of a block, and refine them until the interpolant meets the tolerance."""
 
 import math
 from collections.abc import Callable
@@ -25,20 +25,20 @@ from .quantities import SOLVED
 
 MAX_NODES = 96
 MAX_CELLS = 160
-SHARE = 0.1  # of the tolerance that the nodes' truncation in one direction may take
-CELL_SHARE = 0.4  # the same of the cells: fewer cells are faster, nodes cost nothing
-NODE_FLOOR = 2e-14  # of the tabulated quantities: solver noise below which more nodes gain nothing
+SHARE = 0.1  # part of the tolerance that the nodes' truncation in one direction may take
+CELL_SHARE = 0.4  # the same for cells: fewer cells are faster, nodes cost nothing
+NODE_FLOOR = 2e-14  # solver noise of the tabulated quantities, below which more nodes gain nothing
 
 
 def solve_nodes(
     contact: SolvedContact, index: int, shape: tuple[int, int], border: Border
 ) -> tuple[Array, Array, dict[str, Array], dict[str, Array]]:
-    """Node coordinates of a block (m,), (n,), and what it tabulates there (m, n) by quantity, from
-    fresh solves.
+    """Return node coordinates of a block (m,), (n,), and from fresh solves the tabulated values at
+    the nodes (m, n) by quantity.
 
-    The last is the solver's rounding in it where a base is subtracted: 1 - mu~ and q without a base
-    keep their digits, but the power of the tail loses those of p ~ y~, all of them as 1/y~ goes to
-    0.
+    The last result is the solver's rounding error where a base is subtracted. 1 - mu~ and q without
+    a base keep their digits, but the power of the tail loses those of p ~ y~, and all of them as
+    1/y~ goes to 0.
     """
     chart, numbers, roundings = contact.charts[index], {}, {}
     a, b = nodes(shape[0], chart.a.low, chart.a.high), nodes(shape[1], chart.b.low, chart.b.high)
@@ -48,7 +48,7 @@ def solve_nodes(
         if chart.holds(quantity):
             base, factor = kernels[-1].forms(code, index, v, y, eta, contact.kind.contact)
             rest, complement = solution[quantity.name] - base, SOLVED[quantity.name].complement
-            if complement:  # next to 1 it has the digits
+            if complement:  # next to 1 the complement has the digits
                 rest = np.where(base == 1.0, -solution[complement], rest)
             exact = (base == 0.0) | (base == 1.0)
             if chart.a.name in _LOGARITHMIC and quantity.name == "mu_ratio":
@@ -64,8 +64,8 @@ _LOGARITHMIC = ("y_root", "v_root", "ray_root")
 
 
 def _small_rest(chart: Chart, v: Array, y: Array, solution: dict[str, Array]) -> Array:
-    """Return mu~ less a base of 1 and a logarithm, by 1 - mu~, whose digits are left where y~ is
-    small."""
+    """Return mu~ less a base of 1 and a logarithm, computed from 1 - mu~, which keeps its digits
+    where y~ is small."""
     level = 0.375 * np.log(y) if chart.a.name == "y_root" else 0.1875 * np.log(v)
     return np.asarray(-solution["deficit"] - y * y * level)
 
@@ -75,29 +75,30 @@ def _next(n: int) -> int:
 
 
 def _tail(coefficients: Array, axis: int) -> float:
-    """Return what the interpolant still misses along one axis: its last two Chebyshev coefficients,
-    summed over the other."""
+    """Return the remaining error of the interpolant along one axis: its last two Chebyshev
+    coefficients, summed over the other axis."""
     c = np.abs(np.moveaxis(coefficients, axis, 0)).reshape(coefficients.shape[axis], -1)
     return float(c[-2:].sum(axis=1).max())
 
 
 _CHECK = np.linspace(-1.0, 1.0, 25)
 _FOLLOW = interpolation_matrix(WIDTH, _CHECK) @ np.linalg.inv(interpolation_matrix(WIDTH, LOCAL))
-LINES = 33  # across an axis, along which cells are tried
+LINES = 33  # lines across an axis along which cells are tried
 
 
 def _fewest(axis: Axis, exact: Callable[[Array], Array], bound: float, relative: bool) -> int:
-    """Fewest cells along an axis for which polynomials of a cell's degree follow ``exact``.
+    """Return the fewest cells along an axis for which polynomials of a cell's degree follow
+    ``exact``.
 
-    ``exact`` (points) -> (points, lines) takes evaluation's coordinate; errors are compared with
-    ``bound``.
+    ``exact`` (points) -> (points, lines) takes the evaluation's coordinate; errors are compared
+    with ``bound``.
     """
     low, high = axis.span
     step = 2 if axis.knotted else 1  # the knot of sigma is an edge of cells
     for cells in range(step, MAX_CELLS + 1, step):
         centre = 2.0 * np.arange(cells)[:, None] + 1.0
         places, check = (low + (high - low) * 0.5 * (centre + x) / cells for x in (LOCAL, _CHECK))
-        live = axis.to_file(check[:, -1]) > axis.low  # cells below the block are never visited
+        live = axis.to_file(check[:, -1]) > axis.low  # cells below the block are never evaluated
         places, check = places[live], check[live]
         local = exact(places.ravel()).reshape(*places.shape, -1)
         truth = exact(check.ravel()).reshape(*check.shape, -1)
@@ -111,7 +112,7 @@ def _fewest(axis: Axis, exact: Callable[[Array], Array], bound: float, relative:
 
 
 def _position(axis: Axis, x: Array) -> Array:
-    """Position of evaluation's ``x`` on the axis of nodes, [-1, 1]."""
+    """Return the position of the evaluation's ``x`` on the axis of nodes, [-1, 1]."""
     return (2.0 * axis.to_file(x) - axis.low - axis.high) / (axis.high - axis.low)
 
 
@@ -137,7 +138,7 @@ def _border_cells(piece: int, values: Array, bound: float) -> int:
 
 
 def build_border(sweep: Sweep, tolerance: float) -> list[BorderPiece]:
-    """Return the stored border; its own tolerance is tighter than the table's, since every
+    """Return the stored border.  Its own tolerance is tighter than the table's, because every
     stick-slip node is built on it."""
     bound = max(1e-3 * tolerance, 4e-15)
     pieces = []
@@ -178,8 +179,8 @@ def build_block(
         values = numbers["mu_ratio"]
         tails = [_tail(chebyshev_coefficients(values), axis) for axis in (0, 1)]
         for axis in (0, 1):
-            # twice no better by a third: what is left is the solver's rounding, to which more nodes
-            # only add
+            # twice no improvement by a third: the rest is the solver's rounding, which more nodes
+            # only increase
             stalls[axis] = 0 if tails[axis] < 0.67 * best[axis] else stalls[axis] + 1
             best[axis] = min(best[axis], tails[axis])
         grow = [

@@ -1,4 +1,4 @@
-"""From a tolerance to a verified table file: border, blocks, plain grid, fresh solves,
+"""Build a verified table file from a tolerance: border, blocks, plain grid, fresh solves,
 provenance."""
 
 import json
@@ -26,20 +26,21 @@ from .rounding import ERROR_BITS, round_block, to_bits
 from .verify import QUANTILES, holds, uncovered, verify
 
 MIN_TOLERANCE, MAX_TOLERANCE = 1e-12, 1e-2
-SAFETY = 2.0  # from the largest error found on BLOCK_POINTS fresh solves to the bound of values
-#: the same in every cell.  Less, since nothing is left to chance there: the error of a cell is
-#: known on 17 x 17 of its points, edges included; what is allowed for is the rest that the finer
-#: interpolant misses, see builder/tables/measure.py
+# factor from the largest error found on BLOCK_POINTS fresh solves to the bound of values
+SAFETY = 2.0
+#: the same in every cell.  It is smaller, because nothing is left to chance there: the error of a
+#: cell is known on 17 x 17 of its points, edges included.  The allowance is for the rest that the
+#: finer interpolant misses, see builder/tables/measure.py
 CELL_SAFETY = 1.5
 BLOCK_POINTS = 1500
 FINAL_POINTS = 20_000
-SPRING_POINTS = 2000  # fresh solves that the springs of a ball are compared with
+SPRING_POINTS = 2000  # fresh solves with which the springs of a ball are compared
 ATTEMPTS = 4
 REFERENCE = (
     "Benad J., Nakano K., Popov V. L., Popov M.: Active control of friction by transverse "
     "oscillations. Friction (2018)"
 )
-#: for whoever opens the file with another program
+#: for a person who opens the file with another program
 COMMENT = (
     "mu_ratio is right at its nodes; interpolation between them errs as much as the attributes "
     "interpolation_error_* say. mumacro answers from the blocks in /border, whose tolerance and "
@@ -48,7 +49,7 @@ COMMENT = (
 
 
 class BuildError(MumacroError):
-    """The tolerance was not reached; the message states where and by how much."""
+    """Report that the tolerance was not reached; the message says where and by how much."""
 
 
 # --- the table ------------------------------------------------------------------------------------
@@ -58,7 +59,7 @@ Progress = Callable[[str, bool], None]
 
 
 def stages() -> int:
-    """Return how many stages a build has, each of which calls ``progress`` when it is done."""
+    """Return the number of stages of a build, each of which calls ``progress`` when it is done."""
     of_contacts = sum(len(charts) + len(("errors", "fresh solves")) for charts in CHARTS.values())
     return len(("border", "plain grid")) + of_contacts
 
@@ -72,13 +73,13 @@ def build_table(
     """Build the table for ``tolerance`` (largest absolute error of mu~), verify it and write it to
     ``out``.
 
-    ``progress(text, done)`` is called while a stage runs and when it is done.  A block whose fresh
-    solves miss the tolerance is built again for a third of it.
+    ``progress(text, done)`` is called while a stage runs and when it is done.  If the fresh solves
+    of a block miss the tolerance, it is built again for a third of it.
 
     Raises
     ------
     BuildError
-        When the verified error of a contact does not come below its tolerance.
+        If the verified error of a contact does not come below its tolerance.
     """
     border = Border(pieces := build_border(sweep, tolerance))
     largest = float(border_errors(border, sweep, np.random.default_rng(23), 600).max())
@@ -114,16 +115,16 @@ def build_table(
 def add_contact(
     table: Table, out: Path, name: str, tolerance: float, sweep: Sweep, progress: Progress
 ) -> list[float]:
-    """Build the blocks of a contact into the table and verify them; the tolerances that they were
-    built for.
+    """Build the blocks of a contact into the table and verify them.  Return the tolerances for
+    which they were built.
 
-    The contacts are built in the order of ``atlas.CHARTS``: the springs that a ball is integrated
-    over may be those of the table.
+    The contacts are built in the order of ``atlas.CHARTS``, because the springs of a ball may be
+    those of the table.
 
     Raises
     ------
     BuildError
-        When the verified error does not come below the tolerance.
+        If the verified error does not come below the tolerance.
     """
     contact = SOLVED_BY[name](table, tolerance, sweep)
     tolerance = max(tolerance, contact.least_tolerance)
@@ -162,7 +163,7 @@ def _ball_for(table: Table, tolerance: float, sweep: Sweep) -> SolvedContact:
     return ball(springs_for(table, sweep.workers), tolerance, sweep.workers)
 
 
-#: by contact: what solves it for a table, whose earlier contacts are built
+#: by contact: the function that solves it for a table whose earlier contacts are built
 SOLVED_BY: dict[str, Callable[[Table, float, Sweep], SolvedContact]] = {
     "spring": lambda _table, _tolerance, sweep: spring(sweep),
     "ball": _ball_for,
@@ -170,16 +171,16 @@ SOLVED_BY: dict[str, Callable[[Table, float, Sweep], SolvedContact]] = {
 
 
 def springs_for(table: Table, workers: int) -> Springs:
-    """Return the springs that a ball is integrated over: those of ``table`` where its tolerance is
-    :data:`.contacts.FINE`, else those of the bundled table of that tolerance.
+    """Return the springs over which a ball is integrated: those of ``table`` if its tolerance is
+    :data:`.contacts.FINE`, otherwise those of the bundled table of that tolerance.
 
-    They are compared with fresh solves first, on ``workers`` threads: the solver may have changed
-    since they were built.
+    First they are compared with fresh solves, on ``workers`` threads, because the solver may have
+    changed since they were built.
 
     Raises
     ------
     BuildError
-        No such table is bundled, or it cannot be read, or it is not what the solver gives.
+        If no such table is bundled, it cannot be read, or it differs from the solver.
     """
     remedy = (
         f"a ball is integrated over the springs of the bundled table of {FINE:g}; build that "
@@ -190,7 +191,7 @@ def springs_for(table: Table, workers: int) -> Springs:
         fine = Surrogate(table, "this table") if is_fine else Surrogate.open(FINE)
     except MumacroError as error:
         raise BuildError(f"{error}; {remedy}") from error
-    with Sweep(workers) as sweep:  # its solves are not those of the build
+    with Sweep(workers) as sweep:  # its solves do not count for the build
         report = verify(fine, spring(sweep), SPRING_POINTS)
     if not holds(report, FINE):
         raise BuildError(f"{fine.path} is not what the solver gives now; {remedy}")
@@ -207,8 +208,8 @@ def _miss(report: dict[str, Any], tolerance: float) -> BuildError:
 
 
 def _state_errors(surrogate: Surrogate, contact: SolvedContact, seed: int) -> list[int]:
-    """Measure the errors of the blocks of a contact and write them into the table; the blocks that
-    miss its tolerance."""
+    """Measure the errors of the blocks of a contact and write them into the table.  Return the
+    blocks that miss its tolerance."""
     misses, entry = [], contact.of(surrogate)
     tolerance = entry.tolerance
     for i, largest in enumerate(block_errors(surrogate, contact, BLOCK_POINTS, seed)):
@@ -231,11 +232,10 @@ def _state_errors(surrogate: Surrogate, contact: SolvedContact, seed: int) -> li
 
 
 def verified_attributes(report: dict[str, Any]) -> dict[str, Any]:
-    """Return the attributes of a contact that state what a report of :func:`.verify.verify`
-    found."""
+    """Return the attributes of a contact that state the results of :func:`.verify.verify`."""
     distribution = report["distribution"]
-    # few and flat: each attribute costs about a hundred bytes, and HDF5 keeps more than eight of a
-    # group in a structure of its own, of several kilobytes
+    # few and flat, because each attribute costs about a hundred bytes, and HDF5 keeps more than
+    # eight of a group in a separate structure of several kilobytes
     return {
         "verified_max_abs_error": report["max_abs_error"],
         "verified_max_rel_error": report["max_rel_error"],
@@ -254,8 +254,8 @@ def verified_attributes(report: dict[str, Any]) -> dict[str, Any]:
 def write_verified(
     path: Path, reports: dict[str, dict[str, Any]], of_grid: dict[str, float]
 ) -> None:
-    """Put what reports of :func:`.verify.verify` found, by contact, and the errors of interpolating
-    the plain grid into the attributes of a table file; no other number of it changes."""
+    """Write the results of :func:`.verify.verify`, by contact, and the errors of interpolating the
+    plain grid into the attributes of a table file; no other number of it changes."""
     table = read_table(path)
     table.attributes |= of_grid
     for name, report in reports.items():

@@ -1,8 +1,8 @@
-"""A contact as the builder sees it: its charts, its solver, and what that may be wrong by.
+"""Describe a contact as the builder sees it: its charts, its solver, and the error of the solver.
 
-What differs from contact to contact is data of a :class:`SolvedContact`; whoever builds, measures
-or verifies asks for no name.  ``v`` and ``y`` are those of the charts everywhere: v~ and y~ of one
-spring; of a ball v~/1.5 and y~/1.5, those of its middle spring.
+The differences between contacts are data of a :class:`SolvedContact`; the functions that build,
+measure or verify ask for no name.  ``v`` and ``y`` belong to the charts everywhere: v~ and y~ of
+one spring; for a ball v~/1.5 and y~/1.5 of its middle spring.
 """
 
 from collections.abc import Callable
@@ -23,22 +23,22 @@ from ..solver.sweep import Sweep
 from .draws import DRAWS, Draws
 from .quantities import Sliding, solver_noise
 
-#: tolerance of the springs that a ball is integrated over, whatever that of its table
+#: tolerance of the springs over which a ball is integrated, whatever the tolerance of its table is
 FINE = 1e-12
-#: the least tolerance of a ball: beside the ridge the ring misses 1e-11
+#: the smallest tolerance of a ball: near the ridge the ring misses 1e-11
 BALL_TOLERANCE = 1e-10
-#: what a quadrature over such springs may be wrong by: of mu~ and of the stick fraction, absolute
-#: and relative; of the power, relative
+#: possible error of a quadrature over such springs: of mu~ and of the stick fraction, absolute and
+#: relative; of the power, relative
 BALL_NOISE = 4e-14
 
 
 class Solve(Protocol):
-    """What solves a contact."""
+    """Solve a contact."""
 
     def __call__(
         self, v: Array, y: Array, eta: Array | None = None, *, continuous: bool = False
     ) -> dict[str, Array]:
-        """Results by name at points of the charts' groups; ``continuous``: of the orbit that slides
+        """Return results by name at points of the charts; ``continuous``: for the orbit that slides
         all the time."""
         ...
 
@@ -47,50 +47,50 @@ Noise = Callable[[str, Array, Array, dict[str, Array], Sliding], Array]
 
 
 class SolvedContact(NamedTuple):
-    """One contact; ``noise`` as :func:`.quantities.solver_noise`."""
+    """Hold one contact; ``noise`` as :func:`.quantities.solver_noise`."""
 
     kind: Kind
     solve: Solve
     noise: Noise
-    #: the part of it that bounds allow for beside the errors that a table states
+    #: the part of it that bounds contain in addition to the errors that a table states
     noise_in_bounds: Noise
-    #: quantities whose slopes a table gives
+    #: quantities whose derivatives a table gives
     slope_names: tuple[str, ...]
-    #: whether it is integrated over springs: the error of a quadrature is no rounding of the nodes,
-    #: and its mu~ has its digits in 1 - mu~ where it is next to 1
+    #: whether it is integrated over springs: then the error of a quadrature is not a rounding error
+    #: of the nodes, and mu~ next to 1 has its digits in 1 - mu~
     quadrature: bool
     #: tables of a smaller tolerance have the contact with this one
     least_tolerance: float
-    #: what solves v~crit, where verification of this contact covers the stored border, too
+    #: solves v~crit, if the verification of this contact covers the stored border, too
     border: Sweep | None = None
 
     @property
     def name(self) -> str:
-        """The name of its entry in a table."""
+        """Return the name of its entry in a table."""
         return CONTACTS[self.kind.contact]
 
     @property
     def charts(self) -> tuple[Chart, ...]:
-        """The geometry of its blocks."""
+        """Return the geometry of its blocks."""
         return atlas.CHARTS[self.name]
 
     @property
     def draws(self) -> Draws:
-        """Where it is tried."""
+        """Return where it is tested."""
         return draws_of(self.kind)
 
     def of(self, surrogate: Surrogate) -> TabulatedContact:
-        """Its entry in a table."""
+        """Return its entry in a table."""
         return surrogate.table.contacts[self.name]
 
     def as_asked(self, v: Array, y: Array) -> tuple[Array, Array]:
-        """Return the groups that evaluation makes of those of the contact as a whole, to the last
-        digit, which counts in the corner."""
+        """Return v~ and y~ that the evaluation makes from those of the contact as a whole, to the
+        last digit, which matters in the corner."""
         scale = scale_of(self.kind)
         return scale * v / scale, scale * y / scale
 
     def places(self, surrogate: Surrogate, v: Array, y: Array) -> Codes:
-        """Return the blocks of points (n,), their number where a closed form answers."""
+        """Return the blocks of points (n,); their number if a closed form answers."""
         data = surrogate.tabulated.data("mu_ratio", self.kind)
         return kernels[-1].places(data, v, y, self.kind.contact)[0]
 
@@ -100,34 +100,34 @@ class SolvedContact(NamedTuple):
         return surrogate.quantity(name, scale * v, scale * y, **self.kind.names)
 
     def slopes(self, surrogate: Surrogate, name: str, v: Array, y: Array) -> Array:
-        """Return value, slopes and their bounds, rows (5, n)."""
+        """Return value, derivatives and their bounds, rows (5, n)."""
         return slopes_of(surrogate, self.kind, name, v, y)
 
 
 def scale_of(kind: Kind) -> float:
-    """Return v~ and y~ of a contact over those of its charts."""
+    """Return the ratio of v~ and y~ of a contact to those of its charts."""
     return SPRINGS_OF[CONTACTS[kind.contact]].middle_load
 
 
 def draws_of(kind: Kind) -> Draws:
-    """Where a contact is tried."""
+    """Return where a contact is tested."""
     return DRAWS[CONTACTS[kind.contact]]
 
 
 def ratio_of(surrogate: Surrogate, kind: Kind, v: Array, y: Array) -> Array:
-    """Return mu~ of a table at points of the charts' groups."""
+    """Return mu~ of a table at points of the charts."""
     scale = scale_of(kind)
     return np.asarray(surrogate.quantity("mu_ratio", scale * v, scale * y, **kind.names)[0])
 
 
 def slopes_of(surrogate: Surrogate, kind: Kind, name: str, v: Array, y: Array) -> Array:
-    """Return value, slopes and their bounds there, rows (5, n)."""
+    """Return value, derivatives and their bounds at these points, rows (5, n)."""
     scale = scale_of(kind)
     return np.array(surrogate.tabulated.slopes(name, scale * v, scale * y, kind))
 
 
 def spring(sweep: Sweep) -> SolvedContact:
-    """Return one spring, solved anew at every point."""
+    """Return one spring, which is solved again at every point."""
 
     def solve(
         v: Array, y: Array, eta: Array | None = None, *, continuous: bool = False
@@ -153,7 +153,7 @@ def ball(springs: Springs, tolerance: float = FINE, workers: int = 1) -> SolvedC
     def solve(
         v: Array, y: Array, eta: Array | None = None, *, continuous: bool = False
     ) -> dict[str, Array]:
-        del continuous  # no block of a ball reaches over the border
+        del continuous  # no block of a ball extends over the border
         return integral.solve(v, y, eta)
 
     return SolvedContact(
@@ -179,6 +179,7 @@ def _ball_noise(
 
 
 def _no_noise(name: str, v: Array, y: Array, solution: dict[str, Array], sliding: Sliding) -> Array:
-    """Return a quadrature's own error is a part of the errors that a table of a ball states."""
+    """Return zero noise: the error of a quadrature is a part of the errors that a table of a ball
+    states."""
     del y, solution, sliding, name
     return np.zeros_like(v)

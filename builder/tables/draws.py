@@ -1,6 +1,7 @@
-"""Where a contact is tried: points of every kind, and beside the lines where its blocks meet.
+"""Choose where a contact is tested: points of every type, and points next to the lines where its
+blocks meet.
 
-``v`` and ``y`` are those of the charts: v~ and y~ of one spring, of a ball those of its middle
+``v`` and ``y`` belong to the charts: v~ and y~ of one spring; for a ball those of its middle
 spring.
 """
 
@@ -21,19 +22,19 @@ Pairs = Iterator[tuple[Array, Array, Array, Array]]
 
 
 class Draws(NamedTuple):
-    """Where one contact is tried."""
+    """Describe where one contact is tested."""
 
-    #: kind of case -> share of the points, how they are drawn
+    #: name of a case -> its part of the points, and how they are drawn
     cases: dict[str, tuple[float, Draw]]
-    #: points beside the lines where two blocks or a block and a tail meet
+    #: points next to the lines where two blocks, or a block and a tail, meet
     near_seams: Draw
     #: n pairs on the two sides of each such line, for a seed
     sides: Callable[[Surrogate, int, int], Pairs]
-    #: how far points are in ln v from lines beside the border where slopes have a step
+    #: distance of points in ln v from lines near the border where derivatives have a step
     off_steps: Callable[[Array, Array], Array]
 
     def draw(self, case: str, n: int, surrogate: Surrogate, seed: int) -> tuple[Array, Array]:
-        """Return ``n`` points of one kind of :attr:`cases`."""
+        """Return ``n`` points of one entry of :attr:`cases`."""
         return self.cases[case][1](np.random.default_rng(seed), n, surrogate)
 
 
@@ -81,7 +82,8 @@ def _border(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Arra
 
 
 def _tails(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
-    """Large amplitude at every speed, large speed at every amplitude, small amplitude."""
+    """Return points of large amplitude at every speed, of large speed at every amplitude, and of
+    small amplitude."""
     place = rng.integers(0, 3, n)
     v, y = log_uniform(rng, 1e-6, 1e8, n), log_uniform(rng, 1e5, 1e12, n)
     v = np.where(place == 1, log_uniform(rng, 1e3, 1e8, n), v)
@@ -116,8 +118,8 @@ SIDES = (1 - 1e-13, 1 + 1e-13)
 def _common_sides(
     surrogate: Surrogate, rng: np.random.Generator, n: int, seams: Sequence[float], end: float
 ) -> Pairs:
-    """Pairs (v, v, y, y) of points 2e-13 apart, on either side of seams, the border, the edge of
-    the corner up to y = ``end``."""
+    """Return pairs (v, v, y, y) of points 2e-13 apart, on either side of seams, the border, and the
+    edge of the corner up to y = ``end``."""
     low, high = SIDES
     for seam in seams:
         v = log_uniform(rng, 1e-9, 1e5, n)
@@ -129,7 +131,7 @@ def _common_sides(
 
 
 def _sides(surrogate: Surrogate, n: int, seed: int) -> Pairs:
-    """Yield those of every contact, and of the edge of the closed form."""
+    """Return the pairs of every contact, and pairs at the edge of the closed form."""
     rng, (low, high) = np.random.default_rng(seed), SIDES
     yield from _common_sides(surrogate, rng, n, SEAMS, atlas.Y_STICK_HI)
     y = log_uniform(rng, atlas.Y_CONT, 1e8, n)
@@ -164,8 +166,8 @@ def _near_ball_seams(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Ar
 
 
 def _ring(rng: np.random.Generator, n: int, s: Surrogate) -> tuple[Array, Array]:
-    """Between the steepest ray and the border, and beside both, below and above the ridge where
-    they meet."""
+    """Return points between the steepest ray and the border, and next to both, below and above the
+    ridge where they meet."""
     y = np.where(
         rng.random(n) < 0.5, log_uniform(rng, 1e-6, STEEPEST_Y, n), log_uniform(rng, 1.0, 1.7, n)
     )
@@ -185,7 +187,7 @@ _BALL_CASES: dict[str, tuple[float, Draw]] = {
 
 
 def _ball_sides(surrogate: Surrogate, n: int, seed: int) -> Pairs:
-    """Yield those of every contact, and of the steepest ray."""
+    """Return the pairs of every contact, and pairs at the steepest ray."""
     rng, (low, high) = np.random.default_rng(seed), SIDES
     yield from _common_sides(surrogate, rng, n, _BALL_SEAMS, STEEPEST_Y)
     y = log_uniform(rng, 1e-6, STEEPEST_Y, n)

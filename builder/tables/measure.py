@@ -1,12 +1,12 @@
-"""How far each block is off: the errors that a table states, measured on fresh solves.
+"""Measure the errors of each block on fresh solves: the errors that a table states.
 
 Values are compared with solves at points that crowd towards edges and seams.
 
-How far q and its derivatives are off is measured cell by cell.  The truth is a second interpolant
-of the model, through more nodes, none of which is a node of the table, and which are not rounded.
-What it misses itself is far below what the table misses, or as small as the solver's rounding,
-which both have.  The difference is a smooth function in every cell; it is taken at the Chebyshev
-points of a cell, edges included, where a derivative errs most.
+The errors of q and its derivatives are measured cell by cell.  The reference is a second
+interpolant of the model, through more nodes that are neither nodes of the table nor rounded.  Its
+own error is far below that of the table, or as small as the solver's rounding, which both have.
+The difference is a smooth function in every cell.  It is computed at the Chebyshev points of a
+cell, edges included, where the error of a derivative is largest.
 """
 
 import dataclasses
@@ -43,10 +43,10 @@ from .quantities import SOLVED
 
 
 class BlockErrors(NamedTuple):
-    """Largest errors of a block.
+    """Hold the largest errors of a block.
 
-    By quantity: ``values`` of what is tabulated, over the block; ``cells`` as in
-    :class:`mumacro.table.blocks.Block`. ``absolute``, ``relative``: of mu~.
+    By quantity: ``values`` are errors of the tabulated function over the block; ``cells`` are as in
+    :class:`mumacro.table.blocks.Block`.  ``absolute`` and ``relative`` are errors of mu~.
     """
 
     values: dict[str, float]
@@ -56,7 +56,7 @@ class BlockErrors(NamedTuple):
 
 
 def border_errors(border: Border, sweep: Sweep, rng: np.random.Generator, n: int) -> Array:
-    """Relative errors of v~crit on ``n`` fresh solves, (n,)."""
+    """Return the relative errors of v~crit on ``n`` fresh solves, (n,)."""
     y = 10.0 ** rng.uniform(-4.0, 6.0, n)
     exact = sweep.solve("border", np.ones_like(y), y)["deficit"]
     return np.asarray(np.abs(border(y) / exact - 1.0))
@@ -65,10 +65,11 @@ def border_errors(border: Border, sweep: Sweep, rng: np.random.Generator, n: int
 def _stating(
     surrogate: Surrogate, contact: SolvedContact, error: float, of_border: float
 ) -> Surrogate:
-    """Return the same table with one error for all that it tabulates, and a share of the border's.
+    """Return the same table with one error for all that it tabulates, and a fraction of the
+    border's.
 
-    With the error 1 a bound is the scale of its errors; with 0 it is what it allows beside the
-    table's error.
+    With the error 1 a bound is the scale of its errors; with 0 it is the allowance in addition to
+    the table's error.
     """
     table, entry, replace = surrogate.table, contact.of(surrogate), dataclasses.replace
     border = [
@@ -92,8 +93,8 @@ def _stating(
 def block_errors(
     surrogate: Surrogate, contact: SolvedContact, n: int, seed: int
 ) -> list[BlockErrors]:
-    """Largest errors of every block, those of values on ``n`` fresh solves, without those of a
-    neighbour."""
+    """Return the largest errors of every block; those of values on ``n`` fresh solves, without the
+    errors of a neighbour."""
     stating = tuple(
         _stating(surrogate, contact, error, of_border)
         for error, of_border in ((1.0, 0.0), (0.0, 0.5), (0.0, 0.0))
@@ -118,7 +119,8 @@ def _value_errors(
     rng: np.random.Generator,
     n: int,
 ) -> tuple[dict[str, float], float, float]:
-    """Of what is tabulated by quantity; absolute and relative of mu~."""
+    """Return the errors of the tabulated function by quantity, and the absolute and relative errors
+    of mu~."""
     chart = contact.charts[index]
     v, y, _ = chart.point(_crowded(rng, chart.a, n), _crowded(rng, chart.b, n), surrogate.border)
     v_seam, y_seam = contact.draws.near_seams(rng, 2 * n, surrogate)
@@ -135,8 +137,8 @@ def _value_errors(
         if contact.quadrature and complement:
             truth = np.where(truth > 0.5, 1.0 - solution[complement], truth)
         scale, beside, rounding = (contact.quantity(table, name, v, y)[1] for table in stating)
-        # what the bound allows anyway: half of rounding, and what the border's error does, of which
-        # it states twice
+        # what the bound contains anyway: half of rounding, and the effect of the border's error,
+        # which it counts twice
         noise = (
             contact.noise_in_bounds(name, v, y, solution, chart.regime == CONTINUOUS)
             + beside
@@ -147,7 +149,7 @@ def _value_errors(
 
 
 def _crowded(rng: np.random.Generator, axis: Axis, n: int) -> Array:
-    """File coordinates that crowd towards both ends."""
+    """Return file coordinates that crowd towards both ends."""
     low, high = axis.low, axis.high
     if axis.name == "radius":
         half = n // 2
@@ -162,7 +164,7 @@ def _crowded(rng: np.random.Generator, axis: Axis, n: int) -> Array:
 
 # --- cell by cell ---------------------------------------------------------------------------------
 
-# along either side of a cell: a polynomial of that degree is what an error of T_8 to T_16 is
+# along either side of a cell: an error of T_8 to T_16 is a polynomial of that degree
 POINTS = 17
 _AT = -np.cos(np.arange(POINTS) * math.pi / (POINTS - 1))
 _TO_COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(_AT, POINTS - 1))
@@ -170,16 +172,18 @@ _TO_DERIVATIVE = chebyshev.chebvander(_AT, POINTS - 2) @ chebyshev.chebder(_TO_C
 
 
 def finer(shape: tuple[int, int]) -> tuple[int, int]:
-    """Return numbers of nodes along both coordinates of the interpolant that stands for the
+    """Return the numbers of nodes along both coordinates of the interpolant that represents the
     model."""
     a, b = (n + max(6, n // 2) for n in shape)
     return a, b
 
 
 class _CellPoints:
-    """The points of all cells along one axis, (cells, POINTS); none below the low end of the block.
+    """Hold the points of all cells along one axis, (cells, POINTS); none is below the low end of
+    the block.
 
-    ``widths``: those that the points of the cells cover; zero where the block never reads it.
+    ``widths`` are the widths that the points of the cells cover; zero where the block never
+    evaluates the cell.
     """
 
     def __init__(self, axis: Axis, cells: int, nodes: int) -> None:
@@ -216,20 +220,21 @@ def _difference(
     return interpolant - (a.from_exact @ exact @ b.from_exact.T).reshape(interpolant.shape), a, b
 
 
-#: as many deviations of a coefficient's rounding are left out; the solver's rounding was seen to
-#: reach 2.6 of them
+#: coefficients below this number of standard deviations of their rounding are left out; the
+#: solver's rounding was seen to reach 2.6 of them
 DEVIATIONS = 4.0
 
 
 def _without_noise(exact: Array, noise: Array) -> Array:
     """Return Chebyshev coefficients of the interpolant through ``exact``, without those that are
-    the solver's rounding.
+    only the solver's rounding.
 
     At an edge a second derivative multiplies them by the fourth power of their number, which would
-    hide what the table errs by.  They are those at the level of the last ones, and those that the
-    ``noise`` of the nodes explains.
+    hide the error of the table.  They are the coefficients at the level of the last ones, and the
+    ones that the ``noise`` of the nodes explains.
 
-    The last ones do not tell the second: a node next to an edge has hardly a share in them.
+    The last ones do not show the second group, because a node next to an edge hardly contributes to
+    them.
     """
     c = chebyshev_coefficients(exact)
     last = max(np.abs(c[-2:]).max(), np.abs(c[:, -2:]).max())
@@ -240,12 +245,12 @@ def _without_noise(exact: Array, noise: Array) -> Array:
 
 
 def _without_edge(off: Array, b: _CellPoints, axis: Axis, cells: int) -> None:
-    """Errors along b of the last cells below the border as evaluation has them, see
-    ``src/mumacro/kernel/points.c``.
+    """Correct the errors along b of the last cells below the border in the way of the evaluation,
+    see ``src/mumacro/kernel/points.c``.
 
-    It takes the derivative at the border out of them.  What is left is linear in the distance to
-    the border, by which the chain rule divides; the bound counts it at most half the number of
-    cells per unit of b times.
+    The evaluation removes the derivative at the border from them.  The rest is linear in the
+    distance to the border, by which the chain rule divides; the bound counts it at most half the
+    number of cells per unit of b times.
     """
     end, scale = axis.edge
     root = (end - b.x[-1, :-1]) / scale
@@ -262,8 +267,8 @@ def cell_errors(
     exact: dict[str, Array],
     noise: dict[str, Array],
 ) -> dict[str, Array]:
-    """Largest errors over every cell, (cells, 3) by quantity: of q, of its derivatives along a and
-    along b; of a quantity whose slopes a table does not give, 0 for the derivatives.
+    """Return the largest errors over every cell, (cells, 3) by quantity: of q, and of its
+    derivatives along a and along b.  They are 0 for derivatives that a table does not give.
 
     ``exact`` holds the node values of a second interpolant by quantity, see :func:`finer`;
     ``noise`` their rounding.
@@ -280,8 +285,8 @@ def cell_errors(
 
 
 def _truths(contact: SolvedContact, exact: Array, noise: Array) -> list[Array]:
-    """Return Chebyshev coefficients of the model: without what may be rounding; of a quadrature
-    also all of them, since its error is no rounding of the nodes."""
+    """Return Chebyshev coefficients of the model without what may be rounding; for a quadrature
+    also with all of them, because its error is not a rounding error of the nodes."""
     clean = _without_noise(exact, noise)
     return [clean, chebyshev_coefficients(exact)] if contact.quadrature else [clean]
 

@@ -1,5 +1,5 @@
-"""The plain grid at the root of a table: for plots, and for tools that interpolate by themselves,
-with what those err by."""
+"""Make the plain grid at the root of a table: for plots, and for tools with their own
+interpolation, with the errors of these tools."""
 
 from typing import Any
 
@@ -15,16 +15,17 @@ from mumacro.table.blocks import (
 from ..solver.sweep import Sweep
 from .rounding import ERROR_BITS, bits, to_bits
 
-#: fresh solves that interpolation is compared with: over the whole grid, and along its least v~,
-#: where the corner is sharpest and the largest error is
+#: fresh solves with which interpolation is compared: over the whole grid, and along its smallest
+#: v~, where the corner is sharpest and the error largest
 POINTS = 20_000
 
 
 def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
-    """Return the log-spaced grid for plots; finer for finer tables, nodes solved, not interpolated.
+    """Return the log-spaced grid for plots.  It is finer for finer tables; its nodes are solved,
+    not interpolated.
 
     mu~ and the stick fraction keep as many digits as the table's tolerance needs;
-    ``error_estimate`` is the solver's and that of the rounding.
+    ``error_estimate`` is the error of the solver and of the rounding.
     """
     n = 31 if tolerance > 1e-5 else (61 if tolerance > 1e-9 else 121)
     v, y = np.geomspace(1e-3, 1e3, n), np.geomspace(1e-3, 1e3, n)
@@ -49,11 +50,12 @@ def plain_grid(sweep: Sweep, tolerance: float) -> dict[str, Any]:
 
 
 def interpolation_errors(table: Table, sweep: Sweep, seed: int = 2018) -> dict[str, float]:
-    """Return the attributes of the root that state what tools err by that interpolate the plain
+    """Return the attributes of the root that state the errors of tools that interpolate the plain
     grid.
 
-    Linear and bicubic over ln v~ and ln y~, by scipy; median and 99 % at log-uniform points, the
-    largest error at these and along the least v~.
+    The tools are linear and bicubic interpolation over ln v~ and ln y~ by scipy.  The errors are
+    the median and the 99 % value at log-uniform points, and the largest error at these points and
+    along the smallest v~.
     """
     rng, axes = np.random.default_rng(seed), (np.log(table.v_tilde), np.log(table.y_tilde))
     inner = np.array([rng.uniform(axis[0], axis[-1], POINTS) for axis in axes])

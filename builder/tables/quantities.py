@@ -1,4 +1,4 @@
-"""What only the builder knows of each tabulated quantity; the rest is its record in
+"""Define what only the builder knows about each tabulated quantity; the rest is its record in
 ``src/mumacro/kernel/records.c``.
 
 The solver's column (:data:`builder.solver.sweep.COLUMNS`) has the quantity's name.
@@ -15,14 +15,14 @@ from mumacro.kernel.arrays import Array
 Sliding = NDArray[np.bool_] | bool
 # the largest relative error of mu~ may be this many times the tolerance of a table
 ABS_TO_REL = 10.0
-#: what a fresh solve of mu~ may be wrong by, relative: rounding, and the input's last digit next to
+#: possible error of a fresh solve of mu~, relative: rounding, and the input's last digit next to
 #: the corner
 SOLVER_NOISE = 2e-15
-STICK_NOISE = 1e-15  # the same of the stick fraction, absolute, away from the border
+STICK_NOISE = 1e-15  # the same for the stick fraction, absolute, away from the border
 
 
 class Solved(NamedTuple):
-    """One quantity as the solver gives it.
+    """Describe one quantity as the solver gives it.
 
     ``noise(v, y, value, sliding)``: what a fresh solve may be wrong by, absolute; ``sliding``:
     whether continuously. ``relative``: tables state its error relative to the value.
@@ -36,10 +36,10 @@ class Solved(NamedTuple):
 
 
 def _power_noise(v: Array, y: Array, power: Array, sliding: Sliding) -> Array:
-    """Where it is small it is the difference of larger numbers.
+    """Return the error of the power, which is a difference of larger numbers where it is small.
 
-    In stick-slip what the drive puts in during stick, v~, is taken out; in continuous sliding the
-    angle swings by y~, and only v~ of that is out of phase.
+    In stick-slip the work of the drive during stick, v~, is subtracted; in continuous sliding the
+    angle swings by y~, and only v~ of it is out of phase.
     """
     loss = np.where(
         sliding, np.where(y < 1.0, 1e-15 * y * y, 0.0), np.where(y < 2.0, 4e-15 * v, 0.0)
@@ -62,5 +62,5 @@ SOLVED = {
 def solver_noise(
     name: str, v: Array, y: Array, solution: dict[str, Array], sliding: Sliding
 ) -> Array:
-    """Return what fresh solves of a quantity may be wrong by, absolute."""
+    """Return the possible absolute error of fresh solves of a quantity."""
     return SOLVED[name].noise(v, y, solution[name], sliding)

@@ -1,4 +1,4 @@
-"""Numbers of a file without the bits below its tolerance: zeros, which zlib compresses.
+"""Round numbers of a file: bits below the tolerance become zeros, which zlib compresses.
 
 Errors are those of the rounded numbers.
 """
@@ -18,13 +18,13 @@ ERROR_BITS = 3  # digits of the errors of the plain grid and of cells
 
 
 def bits(tolerance: float) -> int:
-    """Binary digits after the point of which the last one is at most
+    """Return the number of binary digits after the point for which the last digit is at most
     ``tolerance``/:data:`STEPS`."""
     return math.ceil(math.log2(STEPS / tolerance))
 
 
 def to_step(values: Array, tolerance: float) -> Array:
-    """Return ``values`` at multiples of a power of two; none moves by more than half of
+    """Return ``values`` at multiples of a power of two; no value moves by more than half of
     ``tolerance``/:data:`STEPS`."""
     return np.asarray(np.ldexp(np.round(np.ldexp(values, bits(tolerance))), -bits(tolerance)))
 
@@ -42,9 +42,8 @@ def to_bits(values: Array, digits: int, away_from_zero: bool = False) -> Array:
 def round_block(block: Block, tolerance: float) -> Block:
     """Return ``block`` with its node values rounded.
 
-    All that a block tabulates is of order one, and mu~ changes by at most about as much as what is
-    tabulated: a step that is the same for all values of a block suits the relative error of mu~
-    too.
+    Every tabulated function is of order one, and mu~ changes by about as much as it.  So one step
+    for all values of a block is also right for the relative error of mu~.
     """
     return dataclasses.replace(
         block, nodes={name: to_step(x, tolerance) for name, x in block.nodes.items()}

@@ -1,4 +1,5 @@
-"""The table against fresh solves: error off the nodes, coverage of every bound, seams, monotony."""
+"""Verify the table with fresh solves: errors off the nodes, coverage of every bound, seams,
+monotony."""
 
 import math
 from typing import Any, NamedTuple
@@ -23,25 +24,25 @@ from .draws import log_uniform
 from .measure import border_errors
 from .quantities import ABS_TO_REL, SOLVED, SOLVER_NOISE
 
-# of v~crit: nearer, slopes of what is not smooth at the border are not compared
+# distance from v~crit below which derivatives that are not smooth at the border are not compared
 BESIDE_BORDER = 1e-3
-# differences of fresh solves stand for the slopes of the model
+# differences of fresh solves represent the derivatives of the model
 _STENCIL = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
 _SIXTH_ORDER = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
 _FOURTH_ORDER = np.array([0.0, 1.0, -8.0, 8.0, -1.0, 0.0]) / 12.0
-# in ln v~ and ln y~: beside the corner 0.01 leaves out more than the finest table errs by
+# in ln v~ and ln y~: next to the corner a step of 0.01 has a larger error than the finest table
 _STEP = 0.003
-# one point in so many is also compared with differences, which take twelve solves each
+# one point in so many is also compared with differences, which need twelve solves each
 SLOPE_SHARE = 20
 BORDER_POINTS = 2000  # fresh solves of v~crit
-#: shares of the points; the error below which such a share lies is published, the last is the
-#: largest error
+#: fractions of the points; the error that each fraction does not exceed is published, the last one
+#: is the largest error
 QUANTILES = (0.5, 0.95, 0.99, 1.0)
 
 
 def seam_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7, kind: Kind = SPRING) -> float:
-    """Largest |mu~(one side) - mu~(other side)| / mu~ over all seams and the border, 2e-13
-    apart."""
+    """Return the largest |mu~(one side) - mu~(other side)| / mu~ over all seams and the border,
+    2e-13 apart."""
     sides = (
         (ratio_of(surrogate, kind, v1, y1), ratio_of(surrogate, kind, v2, y2))
         for v1, v2, y1, y2 in draws_of(kind).sides(surrogate, n, seed)
@@ -52,8 +53,8 @@ def seam_jumps(surrogate: Surrogate, n: int = 2000, seed: int = 7, kind: Kind = 
 def seam_slope_jumps(
     surrogate: Surrogate, n: int = 2000, seed: int = 7, kind: Kind = SPRING
 ) -> float:
-    """Return the same for v~ d mu~/d v~ and y~ d mu~/d y~, absolute [-]; next to the border both
-    are continuous, too."""
+    """Return the same for v~ d mu~/d v~ and y~ d mu~/d y~, absolute [-]; both are continuous at the
+    border, too."""
     sides = (
         [slopes_of(surrogate, kind, "mu_ratio", v, y)[1:3] for v, y in ((v1, y1), (v2, y2))]
         for v1, v2, y1, y2 in draws_of(kind).sides(surrogate, n, seed)
@@ -64,8 +65,8 @@ def seam_slope_jumps(
 def monotony(
     surrogate: Surrogate, n: int = 3000, lines: int = 200, seed: int = 11, kind: Kind = SPRING
 ) -> float:
-    """Largest step of mu~ in the wrong direction along lines of rising v~ and of rising y~, across
-    all seams [-]."""
+    """Return the largest step of mu~ in the wrong direction along lines of rising v~ and of rising
+    y~, across all seams [-]."""
     rise, worst = np.geomspace(1e-9, 1e7, n), 0.0
     for level in log_uniform(np.random.default_rng(seed), 1e-4, 1e6, lines):
         line = np.full(n, level)
@@ -77,9 +78,9 @@ def monotony(
 
 
 class Neighbours:
-    """Fresh solves around points (n,): three on either side along ln v~ and along ln y~.
+    """Solve around points (n,): three fresh solves on either side along ln v~ and along ln y~.
 
-    A step is a share of the distance to what is not smooth: border and corner.
+    A step is a fraction of the distance to the nearest place that is not smooth: border or corner.
     """
 
     def __init__(self, surrogate: Surrogate, contact: SolvedContact, v: Array, y: Array) -> None:
@@ -101,13 +102,13 @@ class Neighbours:
         )
 
     def slopes(self, name: str) -> tuple[Array, Array]:
-        """Slopes along ln v~ and ln y~, (2, n), by central differences, and what these may be wrong
-        by."""
+        """Return the derivatives with respect to ln v~ and ln y~, (2, n), by central differences,
+        and their possible error."""
         slope, noise = np.empty((2, self.v.size)), np.empty((2, self.v.size))
         sliding = (self.v > self.crit)[:, None]
         for row, (step, solution) in enumerate(zip(self.steps, self.solved, strict=True)):
             slope[row] = solution[name] @ _SIXTH_ORDER / step
-            # what the fourth order leaves out; the sixth leaves out up to a seventh of it
+            # the error of the fourth order; the sixth order has up to a seventh of it
             left_out = np.abs(slope[row] - solution[name] @ _FOURTH_ORDER / step)
             each = self.noise(name, self.v[:, None], self.y[:, None], solution, sliding).max(axis=1)
             noise[row] = (2.0 * each + 4e-16 * np.abs(slope[row])) / step + 0.2 * left_out
@@ -115,11 +116,11 @@ class Neighbours:
 
 
 class _Comparison(NamedTuple):
-    """Errors, which are beyond the solver's own for all but mu~, the same relative to the value,
-    bounds, bounds over errors, sources.
+    """Hold errors (for all but mu~ only what exceeds the solver's own), the same relative to the
+    value, bounds, bounds over errors, sources.
 
-    ``over``: bound and solver's own error together, over the difference to the fresh solve; NaN
-    where that difference is no larger than the solver's own error.
+    ``over`` is bound plus solver's own error, divided by the difference from the fresh solve; NaN
+    if this difference is not larger than the solver's own error.
     """
 
     error: Array
@@ -131,7 +132,7 @@ class _Comparison(NamedTuple):
 
 
 def bound_over_error(bound: Array, noise: Array, difference: Array) -> Array:
-    """Return what :class:`_Comparison` has as ``over``."""
+    """Return the values of ``over`` in :class:`_Comparison`."""
     with np.errstate(all="ignore"):
         return np.where(difference > noise, (bound + noise) / difference, np.nan)
 
@@ -158,13 +159,13 @@ def _values(
 def _slopes(
     surrogate: Surrogate, contact: SolvedContact, around: Neighbours, name: str
 ) -> _Comparison:
-    """Return the logarithmic slopes, both of each point."""
+    """Return the comparison of both logarithmic derivatives of each point."""
     (truth, noise), (v, y) = around.slopes(name), (around.v, around.y)
     source = contact.quantity(surrogate, "mu_ratio", v, y)[2]
     _, along_v, along_y, *bounds = contact.slopes(surrogate, name, v, y)
     difference, bound = np.abs(np.stack((along_v, along_y)) - truth), np.stack(bounds)
     off, over = np.maximum(difference - noise, 0.0), bound_over_error(bound, noise, difference)
-    # at the border of one that is not smooth there, the last digits of v~crit decide
+    # at the border of a quantity that is not smooth there, the last digits of v~crit decide
     keep = np.full(v.shape, True)
     if not QUANTITIES[QUANTITY_NAMES.index(name)].smooth_at_border:
         keep = np.abs(v / around.crit - 1.0) > BESIDE_BORDER
@@ -183,7 +184,7 @@ def _summary(comparison: _Comparison, selected: Any = slice(None)) -> dict[str, 
 
 
 def _report(parts: list[_Comparison]) -> dict[str, Any]:
-    """Return all together, and by source."""
+    """Return the results for all points, and by source."""
     whole = _Comparison(*(np.concatenate(column) for column in zip(*parts, strict=True)))
     names = sorted((SOURCES[code], code) for code in np.unique(whole.source))
     return {
@@ -193,8 +194,8 @@ def _report(parts: list[_Comparison]) -> dict[str, Any]:
 
 
 def distribution(error: Array, over: Array) -> dict[str, list[float]]:
-    """Errors at :data:`QUANTILES`; least, median and largest bound over error, 0 where no error is
-    beyond the solver's own."""
+    """Return errors at :data:`QUANTILES`; and the least, median and largest bound over error, 0 if
+    no error exceeds the solver's own."""
     ratios = over[~np.isnan(over)]
     return {
         "error_quantiles": np.quantile(error, QUANTILES).tolist(),
@@ -207,7 +208,8 @@ def distribution(error: Array, over: Array) -> dict[str, list[float]]:
 def _distributions(
     values: dict[str, list[_Comparison]], slopes: list[_Comparison], border: _Comparison | None
 ) -> dict[str, dict[str, list[float]]]:
-    """By quantity, then of the slopes of mu~ along ln v~ and ln y~, and of v~crit, relative."""
+    """Return the distributions by quantity, then of the derivatives of mu~ with respect to ln v~
+    and ln y~, and of v~crit, relative."""
     columns = {}
     for name, parts in values.items():
         error = [part.relative if SOLVED[name].relative else part.error for part in parts]
@@ -224,7 +226,7 @@ def _distributions(
 
 
 def _border_comparison(surrogate: Surrogate, sweep: Sweep, rng: np.random.Generator) -> _Comparison:
-    """Errors of v~crit, all relative."""
+    """Return the errors of v~crit, all relative."""
     error = border_errors(surrogate.border, sweep, rng, BORDER_POINTS)
     bound, noise = (
         np.full_like(error, surrogate.border.max_rel_error),
@@ -242,8 +244,8 @@ def _border_comparison(surrogate: Surrogate, sweep: Sweep, rng: np.random.Genera
 
 
 def uncovered(report: dict[str, Any]) -> dict[str, int]:
-    """Of the report of :func:`verify`: how many values and slopes of each quantity, and
-    speeds of the border, miss their bound."""
+    """Return how many values and derivatives of each quantity, and speeds of the border, miss their
+    bound in a report of :func:`verify`."""
     misses = {
         name: report.get(name, report)["not_covered"]
         for name in report["distribution"]

@@ -1,1 +1,1 @@
-"""Functional Mock-up Units of a table."""
+"""Export a table as Functional Mock-up Units."""

@@ -1,5 +1,5 @@
-"""``--format fmu``: a table as a Functional Mock-up Unit, FMI 2.0 or 3.0, made of the C header; no
-Python inside.
+"""Export with ``--format fmu``: a table as a Functional Mock-up Unit, FMI 2.0 or 3.0, made from the
+C header, without Python.
 
 Inputs are mu0, Fz, k, y0, omega, v0 and Fz_amplitude; outputs mu_macro, mu_ratio and force, the
 friction force along v0 that is regularised below the parameter v_rest, with directional derivatives
@@ -10,8 +10,9 @@ Fz_amplitude counts for direction normal alone, y0 for the others.  Model Exchan
 Co-Simulation.  An illegal input makes a simulator's call return "discard", with the reason in its
 log.
 
-The unit holds its sources, the binary of the machine it is made on, and where zig is installed
-those of Linux and Windows for 64-bit Intel and AMD; without any compiler the sources alone.
+The unit contains its sources, the binary of the machine on which it is made, and, if zig is
+installed, binaries of Linux and Windows for 64-bit Intel and AMD. Without a compiler it contains
+only the sources.
 """
 
 import importlib.util
@@ -55,7 +56,7 @@ _TEXTS = {
     "force": "friction force along v0, mu_macro Fz from v_rest on",
     "v_rest": "speed below which force is regularised",
 }
-_MEASURED = (*STARTS, "force", "v_rest")  # in units
+_MEASURED = (*STARTS, "force", "v_rest")  # these have units
 _OUTPUTS, _INTEGERS = ("mu_macro", "mu_ratio", "force"), ("regime", "source")
 _CHOICES: dict[str, tuple[str, ...]] = {"contact": CONTACTS, "direction": DIRECTIONS}
 _UNITS = """<UnitDefinitions>
@@ -109,15 +110,15 @@ def _unit(table: Table, version: int) -> bytes:
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in (files | binaries).items():
-            entry = zipfile.ZipInfo(name)  # 1980: the same table gives the same bytes
+            entry = zipfile.ZipInfo(name)  # year 1980, so that the same table gives the same bytes
             entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
             archive.writestr(entry, content)
     return out.getvalue()
 
 
 def _targets(version: int) -> Iterator[tuple[str, list[str]]]:
-    """Yield files below ``binaries`` and the commands that make them; zig first, which binds to an
-    old C library."""
+    """Yield files below ``binaries`` and the commands that make them. zig comes first, because it
+    links to an old C library."""
     folders = {
         "x86_64-linux": "linux64",
         "x86_64-windows": "win64",
@@ -141,7 +142,7 @@ def _targets(version: int) -> Iterator[tuple[str, list[str]]]:
 
 
 def _zig(target: str) -> list[str] | None:
-    """Return the command that compiles for a target of zig; None where the package ziglang is not
+    """Return the command that compiles for a target of zig, or None if the package ziglang is not
     installed."""
     package = importlib.util.find_spec("ziglang")
     return [sys.executable, "-m", "ziglang", "cc", "-target", target] if package else None
@@ -152,7 +153,8 @@ def _compile(texts: dict[str, str], command: list[str]) -> bytes:
     with tempfile.TemporaryDirectory(prefix="mumacro-") as folder:
         for name, text in texts.items():
             Path(folder, name).write_text(text, "ascii")
-        # the folder by its whole name: zig's cache would take two files "./mumacro.h" for one
+        # the complete path of the folder, because zig's cache would take two files "./mumacro.h"
+        # for one
         arguments = [*command, f"-I{folder}", "-o", "made"]
         process = subprocess.run(  # noqa: S603
             arguments, cwd=folder, capture_output=True, text=True, check=False
