@@ -135,8 +135,8 @@ def mixed_load(minutes: float) -> str:
     ]
     table = markdown(("question", "right", "refused (503)", "wrong"), rows)
     return (
-        f"{table}\n\nLongest wait of /livez {1e3 * max(waits):.0f} ms; {grown:.0f} MB more at the "
-        f"end than after a tenth of the time; exit code {code}."
+        f"{table}\n\nLongest wait of /livez {1e3 * max(waits).seconds:.0f} ms; {grown:.0f} MB more "
+        f"at the end than after a tenth of the time; exit code {code}."
     )
 
 

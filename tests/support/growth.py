@@ -10,7 +10,7 @@ import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from functools import cache, partial
 from itertools import product
 from re import _parser  # type: ignore[attr-defined]
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ SHORT, LONG = 4 * 1024, 64 * 1024  # characters
 #: the largest ratio of the times of a long and a short text: 16 if linear, 256 if quadratic
 MOST = 64.0
 _LOOK = (250, 500, 1000, 2000)  # characters, while the worst text is looked for
-_TOO_LONG_S = 0.01  # for 2000 characters; a linear expression takes a hundredth of that
+_TOO_LONG = 3000.0  # times as long as an expression that takes each character once
 _CHARACTERS = "\t\n !\"%'()*,-./019:;<=>@AZ[\\]_az{}~\0é–µ"
 _CATEGORIES = {
     f"CATEGORY_{name}": re.compile(text)
@@ -174,6 +174,12 @@ def _runner(compiled: re.Pattern[Any], method: str) -> Callable[[Any], object]:
     return one
 
 
+@cache
+def _once(size: int) -> float:
+    """The time of an expression that takes each of so many characters once [s]."""
+    return _best(re.compile("[ab]*c").match, "a" * size, 20)
+
+
 def _ratio(run: Callable[[int], float]) -> float:
     """Of the times of a long and a short text; a quadratic one is left before the longest."""
     for _ in range(3):  # another program may have run beside one of them
@@ -202,7 +208,7 @@ def growth(pattern: str | bytes, flags: int, method: str) -> Iterator[tuple[str,
         slowest, ratio = 0.0, None
         worst: Callable[[int], str] = str
         for size, make in product(_LOOK, _texts(repetition, characters)):
-            limit = _TOO_LONG_S * size / _LOOK[-1]
+            limit = _TOO_LONG * _once(size)
             if seconds(make, 2, size) > limit and seconds(make, 5, size) > limit:
                 worst, ratio = make, float("inf")
                 break

@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from http.client import HTTPConnection
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": 1.3e5, "v0": 0.01}
@@ -186,17 +186,25 @@ def running(
         server.kill()
 
 
+class Wait(NamedTuple):
+    """How long a client waited: on the clock, and by the processor time that the service took
+    meanwhile, which no other program lengthens."""
+
+    seconds: float
+    busy: float
+
+
 @contextmanager
-def asking(server: Server, pause: float = 0.02) -> Iterator[list[float]]:
+def asking(server: Server, pause: float = 0.02) -> Iterator[list[Wait]]:
     """Ask ``/livez`` on new connections until the context ends; it must always answer 200.  The
-    waits [s]."""
-    stop, waits = threading.Event(), list[float]()
+    waits."""
+    stop, waits = threading.Event(), list[Wait]()
 
     def ask() -> None:
         while not waits or not stop.wait(pause):
-            started = time.perf_counter()
+            started, before = time.perf_counter(), server.busy()
             assert server.ask("GET", "/livez")[0] == 200
-            waits.append(time.perf_counter() - started)
+            waits.append(Wait(time.perf_counter() - started, server.busy() - before))
 
     with ThreadPoolExecutor(1) as pool:
         loop = pool.submit(ask)
