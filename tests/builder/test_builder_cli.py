@@ -51,23 +51,27 @@ def refused(done: Any, *parts: str) -> None:
         assert part in message
 
 
-def test_build_writes_a_table_that_verifies(run_builder: Run, tmp_path: Path) -> None:
+def test_build_writes_a_table_that_verifies(
+    here: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # its last fresh solves are verified below, by others
+    monkeypatch.setattr("builder.tables.build.FINAL_POINTS", 500)
     out = tmp_path / "rough.nc"
-    done = run_builder("build", "--tolerance", "1e-3", "--out", out, "--workers", 2)
+    done = here("build", "--tolerance", "1e-2", "--out", out, "--workers", 2)
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)  # JSON only: the progress bar goes to stderr
     opened = Surrogate.open(out)
     assert (report["table"], report["content_sha256"]) == (str(out), opened.checksum)
-    assert report["tolerance"] == opened.tolerance == 1e-3
-    assert report["verified_max_abs_error"] == opened.max_abs_error <= 1e-3
-    assert report["verified_max_rel_error"] == opened.max_rel_error <= ABS_TO_REL * 1e-3
+    assert report["tolerance"] == opened.tolerance == 1e-2
+    assert report["verified_max_abs_error"] == opened.max_abs_error <= 1e-2
+    assert report["verified_max_rel_error"] == opened.max_rel_error <= ABS_TO_REL * 1e-2
     assert report["bytes"] == out.stat().st_size
     assert report["n_solves"] == opened.attributes["n_solves"]
     assert report["n_solves"] > 10_000
     # no partial file
     assert [path.name for path in tmp_path.iterdir()] == ["rough.nc"]
 
-    verified = run_builder("verify", out, "--points", 300, "--seed", 5)
+    verified = here("verify", out, "--points", 300, "--seed", 5)
     assert verified.returncode == 0, verified.stderr
     report = json.loads(verified.stdout)
     assert report["holds"] is True
@@ -103,8 +107,12 @@ def test_verify_stores_what_it_finds_only_when_asked(
     table.contacts["spring"].attributes["tolerance"] = 1e-9
     write_table(table, path)
     image = path.read_bytes()
-    refused(here(*words, "--write"), "misses its tolerance")
+    done = here(*words, "--write")
+    refused(done, "copy.nc", "misses its tolerance of 1e-09")
     assert path.read_bytes() == image
+    report = json.loads(done.stdout)
+    assert report["holds"] is False
+    assert report["contacts"]["spring"]["max_abs_error"] > 1e-9
 
 
 def test_solve_answers_at_the_ends_of_its_range(run_builder: Run, here: Run) -> None:
@@ -121,20 +129,6 @@ def test_solve_answers_at_the_ends_of_its_range(run_builder: Run, here: Run) -> 
     # far below the border: not computed
     assert (answer["regime"], answer["min_slip_speed"]) == ("stick_slip", None)
     assert answer["stick_fraction"] > 0.99
-
-
-def test_verify_rejects_a_table_that_misses_its_tolerance(
-    here: Run, tables_dir: Path, tmp_path: Path
-) -> None:
-    table = read_table(tables_dir / "mumacro-1e-4.nc")
-    # it states a tolerance that it does not meet
-    table.contacts["spring"].attributes["tolerance"] = 1e-9
-    write_table(table, tmp_path / "boast.nc")
-    done = here("verify", tmp_path / "boast.nc", "--points", 300)
-    refused(done, "boast.nc", "misses its tolerance of 1e-09")
-    report = json.loads(done.stdout)
-    assert report["holds"] is False
-    assert report["contacts"]["spring"]["max_abs_error"] > 1e-9
 
 
 def test_verify_refuses_a_damaged_table(here: Run, tables_dir: Path, tmp_path: Path) -> None:

@@ -41,12 +41,18 @@ class Installed:
     def __init__(self, folder: Path, wheel: Path, python: str = sys.executable) -> None:
         self.folder = folder
         self.bin = folder / "venv" / ("Scripts" if os.name == "nt" else "bin")
-        subprocess.run([python, "-m", "venv", folder / "venv"], check=True)
-        # the tested versions, probably in pip's cache
+        # the tested versions, probably in a cache
         pins = folder / "pins.txt"
         pins.write_text("".join(f"{name}=={importlib.metadata.version(name)}\n" for name in CORE))
+        wanted = ("--only-binary=:all:", "-c", str(pins), str(wheel))
+        if uv := shutil.which("uv"):  # its cache is that of the other environments
+            subprocess.run([uv, "venv", "-q", "-p", python, folder / "venv"], check=True)
+            into = ("-p", self.bin / "python", "--no-progress")
+            subprocess.run([uv, "pip", "install", "-q", *into, *wanted], check=True)
+            return
+        subprocess.run([python, "-m", "venv", folder / "venv"], check=True)
         pip = ("-m", "pip", "--disable-pip-version-check", "install", "-q", "--no-compile")
-        self.run("python", *pip, "--only-binary=:all:", "-c", str(pins), str(wheel))
+        self.run("python", *pip, *wanted)
 
     def run(self, *words: Any, code: int = 0) -> Any:
         variables = {
@@ -94,12 +100,13 @@ def build(folder: Path, platform: str | None = None) -> Path:
     if platform is None:
         own = {*platform_tags()} if importlib.util.find_spec("ziglang") else set()
         platform = next((tags for tags in PLATFORMS if own & {*tags.split(".")}), "")
-    places = (ROOT / name for name in ("mumacro", "builder", "service", "tables"))
+    places = (ROOT / name for name in ("src/mumacro", "builder", "service", "tables"))
     files = [
         path
         for place in places
         for path in place.rglob("*")
-        if path.suffix not in (".so", ".pyc", "")
+        # what is made there is no source
+        if path.suffix not in (".so", ".pyc", "") and path.name != "_declarations.py"
     ]
     newest = max(
         path.stat().st_mtime for path in (*files, ROOT / "hatch_build.py", ROOT / "pyproject.toml")

@@ -18,7 +18,8 @@ from typing import Any, NamedTuple
 SHORT, LONG = 4 * 1024, 64 * 1024  # characters
 #: the largest ratio of the times of a long and a short text: 16 if linear, 256 if quadratic
 MOST = 64.0
-_LOOK = (250, 500, 1000, 2000)  # characters, while the worst text is looked for
+#: characters, while the worst text is looked for: the first find what is cubic or has no end
+_LOOK = (250, 2000)
 _TOO_LONG = 3000.0  # times as long as an expression that takes each character once
 _CHARACTERS = "\t\n !\"%'()*,-./019:;<=>@AZ[\\]_az{}~\0é–µ"
 _CATEGORIES = {
