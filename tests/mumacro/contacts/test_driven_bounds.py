@@ -91,6 +91,26 @@ def test_the_bounds_of_the_rule_hold_where_coefficients_are_trusted_to_fall(
     assert np.all(widths < WIDEST_OF_RULE)
 
 
+@needs_digits
+@pytest.mark.slow
+def test_the_bounds_of_a_ball_along_hold_where_the_last_digits_decide_which_springs_turn_back(
+    table: Surrogate,
+) -> None:
+    """The line from which the middle spring slips backwards, and three doubles on either side: the
+    slopes jump by the root of a digit."""
+    rng, n = np.random.default_rng(10), 1500
+    x = np.where(
+        rng.random(n) < 0.5,
+        10.0 ** rng.uniform(-6.0, -0.01, n),
+        1.0 - 10.0 ** rng.uniform(-8, -0.5, n),
+    )
+    exact = x.astype(np.longdouble)
+    turned = np.sqrt((1.0 - exact) * (1.0 + exact)) - exact * np.arccos(exact)
+    y = (1.5 / turned).astype(float)
+    y += np.spacing(y) * rng.integers(-3, 4, n)
+    check(table, x * y, y, "ball", "along", extended.ball(x * y, y, 48))
+
+
 def test_the_weights_of_the_rule_are_right_to_their_bound() -> None:
     """``MU_RULE_ROUNDING`` of contact.c: a rule with more digits, by Newton's method."""
     x: Any = np.polynomial.legendre.leggauss(DRIVEN_NODES)[0].astype(np.longdouble)

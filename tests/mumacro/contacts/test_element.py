@@ -107,6 +107,24 @@ def test_slip_turns_the_force_as_its_closed_form_in_30_digits() -> None:
             assert force == close(expected, rel=0.0, abs=2e-15 * after + 5e-324)
 
 
+def test_a_force_nearly_against_the_motion_turns_as_its_closed_form() -> None:
+    """The limit falls faster than the spring unloads, so that it slips at once."""
+    rng, n = np.random.default_rng(15), 300
+    angle = math.pi - 10.0 ** rng.uniform(-9.0, -0.5, n)
+    last = 10.0 ** -rng.uniform(0.5, 10.0, n)
+    way = (1.0 - last) / rng.uniform(1.05, 2.0, n)
+    contacts = Element(1.0, np.ones(n), 1.0)
+    contacts.state = np.stack([np.cos(angle), np.sin(angle)], -1)[:, None]
+    forces = np.array(contacts.step(way, 0.0, Fz=last))
+    with mpmath.workdps(30):
+        for force, after, start, path in zip(forces.T, last, angle, way, strict=True):
+            b = mpmath.mpf(float(after))
+            left = mpmath.exp(-mpmath.mpf(float(path)) * mpmath.log(b) / (b - 1))
+            psi = 2 * mpmath.atan(mpmath.tan(mpmath.mpf(float(start)) / 2) * left)
+            expected = [float(b * mpmath.cos(psi)), float(b * mpmath.sin(psi))]
+            assert force == close(expected, rel=0.0, abs=1e-12 * after)
+
+
 def test_a_straight_step_is_exact_while_the_normal_force_changes() -> None:
     rng = np.random.default_rng(12)
     first, last = 10.0 ** rng.uniform(-1, 1, (2, 1000))
