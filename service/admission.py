@@ -330,9 +330,15 @@ def client_of(scope: Scope) -> str:
     return address[:64]
 
 
+def ticket_in(scope: Scope) -> Ticket | None:
+    """Return the ticket of a request, if it holds something."""
+    ticket: Ticket | None = scope.get(_TICKET)
+    return ticket
+
+
 def ticket_of(scope: Scope) -> Ticket:
     """Return the ticket of a request; :class:`Admitted` takes it back."""
-    ticket: Ticket | None = scope.get(_TICKET)
+    ticket = ticket_in(scope)
     if ticket is None:
         ticket = scope[_TICKET] = Ticket(scope)
     return ticket
@@ -361,6 +367,6 @@ class Admitted:
         try:
             await self._app(scope, receive, send)
         finally:
-            if ticket := scope.get(_TICKET):
+            if ticket := ticket_in(scope):
                 ticket.hold(0)
                 ticket.leave()

@@ -24,11 +24,11 @@ from pydantic.json_schema import models_json_schema
 from starlette.datastructures import State
 from starlette.middleware.cors import CORSMiddleware
 from starlette.responses import RedirectResponse
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp
 
 from . import __version__
 from .admission import Admission, Admitted, Thread, threads_end
-from .bodies import Direct
+from .bodies import Direct, HeadAsGet
 from .guide_pages import GuidePages
 from .metrics import Metrics
 from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
@@ -175,33 +175,6 @@ class Service(FastAPI):
             schema: dict[str, Any] = self.openapi_schema or _described(self)
             self.openapi_schema = schema
         return schema
-
-
-class HeadAsGet:
-    """Answer HEAD as GET, without the body (middleware)."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer one request."""
-        if scope["type"] != "http" or scope["method"] != "HEAD":
-            await self._app(scope, receive, send)
-            return
-
-        closes = False
-
-        async def send_head(message: Message) -> None:
-            nonlocal closes
-            if message["type"] == "http.response.start":
-                closes = (b"connection", b"close") in message["headers"]
-                await send(message)
-                if not closes:  # at once, because the client may already send its next request
-                    await send({"type": "http.response.body", "body": b""})
-            elif closes:  # when the rest of the request has been read
-                await send({**message, "body": b""})
-
-        await self._app({**scope, "method": "GET"}, receive, send_head)
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:

@@ -18,7 +18,7 @@ from fastapi.routing import APIRoute
 from pydantic import ValidationError
 from starlette.requests import ClientDisconnect
 from starlette.routing import BaseRoute
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from .admission import Ticket, compute, ticket_of
 from .json_text import decode
@@ -249,6 +249,33 @@ class DirectRoute(APIRoute):
         if self.dependant.dependencies:
             raise TypeError(f"{self.path} has a dependency, which a DirectRoute does not solve")
         return of_body if in_body else of_query
+
+
+class HeadAsGet:
+    """Answer HEAD as GET, without the body (middleware)."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer one request."""
+        if scope["type"] != "http" or scope["method"] != "HEAD":
+            await self._app(scope, receive, send)
+            return
+
+        closes = False
+
+        async def send_head(message: Message) -> None:
+            nonlocal closes
+            if message["type"] == "http.response.start":
+                closes = (b"connection", b"close") in message["headers"]
+                await send(message)
+                if not closes:  # at once, because the client may already send its next request
+                    await send({"type": "http.response.body", "body": b""})
+            elif closes:  # when the rest of the request has been read
+                await send({**message, "body": b""})
+
+        await self._app({**scope, "method": "GET"}, receive, send_head)
 
 
 class Direct:

@@ -2,7 +2,6 @@
 
 import secrets
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -70,19 +69,16 @@ class ClearHead:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let a request pass if its headers are unambiguous."""
-        if scope["type"] == "http":
-            _check(scope, dict(scope["headers"]))
+        fields = scope.get("headers", ())
+        headers = dict(fields)
+        if scope.get("http_version") == "1.1" and b"host" not in headers:
+            raise RequestError(ProblemKind.MALFORMED_HTTP, "a request of HTTP/1.1 has one Host")
+        if headers.get(b"transfer-encoding", b"chunked").lower().strip(b" \t,") != b"chunked":
+            raise RequestError(ProblemKind.MALFORMED_HTTP, "the only transfer coding is chunked")
+        if len(headers) != len(fields):
+            names = [name for name, _ in fields]
+            for name in _ONCE:
+                if names.count(name) > 1:
+                    detail = f"the header {name.decode()} is given more than once"
+                    raise RequestError(ProblemKind.MALFORMED_HTTP, detail)
         await self._app(scope, receive, send)
-
-
-def _check(scope: Scope, headers: Mapping[bytes, Any]) -> None:
-    if scope["http_version"] == "1.1" and b"host" not in headers:
-        raise RequestError(ProblemKind.MALFORMED_HTTP, "a request of HTTP/1.1 has one Host")
-    if headers.get(b"transfer-encoding", b"chunked").lower().strip(b" \t,") != b"chunked":
-        raise RequestError(ProblemKind.MALFORMED_HTTP, "the only transfer coding is chunked")
-    if len(headers) != len(scope["headers"]):
-        names = [name for name, _ in scope["headers"]]
-        for name in _ONCE:
-            if names.count(name) > 1:
-                detail = f"the header {name.decode()} is given more than once"
-                raise RequestError(ProblemKind.MALFORMED_HTTP, detail)

@@ -159,7 +159,21 @@ NOT_BOTH: Any = {
 }
 
 
-class CaseInputs(Strict):
+class _Inputs(Strict):
+    """Members of which some are inputs."""
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """Return the inputs that are there, by name; a rigid contact is infinite, and an interval
+        in k becomes its two ends."""
+        values = self.__dict__
+        inputs = {name: values[name] for name in INPUTS if values.get(name) is not None}
+        if type(inputs.get("k")) is str:
+            inputs |= stiffness_inputs(inputs.pop("k"))
+        return inputs
+
+
+class CaseInputs(_Inputs):
     """One case, in SI units; omega or f, and k or an interval of it: exactly one of each."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE], **ALTERNATIVES})
@@ -175,13 +189,8 @@ class CaseInputs(Strict):
     k_low: StiffnessEnd | None = optional(_LOW)
     k_high: StiffnessEnd | None = optional(_HIGH)
 
-    @property
-    def inputs(self) -> dict[str, Any]:
-        """Return the inputs that are there, by name; a rigid contact is infinite."""
-        return _inputs_of(self)
 
-
-class OtherInputs(Strict):
+class OtherInputs(_Inputs):
     """Inputs of a question about one of them, which is left out or null."""
 
     mu0: Friction | None = optional(_MU0, examples=[0.3])
@@ -199,17 +208,10 @@ class OtherInputs(Strict):
     def inputs(self) -> dict[str, Any]:
         """Return the inputs that are there, by name; a rigid contact is infinite, and a null in k
         stays."""
-        inputs = _inputs_of(self)
+        inputs = super().inputs
         if self.k is None and "k" in self.model_fields_set:
             inputs["k"] = None
         return inputs
-
-
-def _inputs_of(model: BaseModel) -> dict[str, Any]:
-    """Return the inputs that are there, by name; an interval in k becomes its two ends."""
-    values = model.__dict__
-    inputs = {name: values[name] for name in INPUTS if values.get(name) is not None}
-    return inputs | stiffness_inputs(inputs.pop("k")) if type(inputs.get("k")) is str else inputs
 
 
 # --- columns --------------------------------------------------------------------------------------

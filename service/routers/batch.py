@@ -19,7 +19,7 @@ from starlette.types import Receive, Scope, Send
 from mumacro.inputs.cases import KIND
 from mumacro.stopping import look
 
-from ..admission import AT_ONCE, LONG, ticket_of
+from ..admission import AT_ONCE, LONG, ticket_in, ticket_of
 from ..batch import Batch
 from ..bodies import JSON, from_client, only_json, read_body, within
 from ..forms import MORE_CASES, read
@@ -84,7 +84,8 @@ class _Answer(Response):
         of_reading = cost if cost > LONG else cost + _by_one(text)
         read_it = self._batch if of_reading <= AT_ONCE else self._batch_in_turn
         batch = await run(partial(read_it, text), of_reading)
-        ticket_of(self._scope).hold(0)  # the text is gone
+        if ticket := ticket_in(self._scope):
+            ticket.hold(0)  # the text is gone
         cost += batch.cost
         pieces = _gathered(batch.write(), self._piece)
         piece, following = await run(lambda: (next(pieces, b""), next(pieces, None)), cost)
@@ -95,7 +96,8 @@ class _Answer(Response):
         while following is not None:
             await give(piece, unfinished=True)
             piece, following = following, await run(lambda: next(pieces, None), cost)
-        ticket_of(self._scope).leave()
+        if ticket := ticket_in(self._scope):
+            ticket.leave()
         await give(piece, unfinished=False)
 
     def _batch_in_turn(self, text: bytearray) -> Batch:
