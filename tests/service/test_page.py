@@ -275,6 +275,8 @@ def test_it_fits_every_width(open_page: Any, width: int, address: str) -> None:
     )
     assert lines <= 2  # a deviation is set smaller, on the same line
     assert box["x"] + box["width"] <= card["x"] + card["width"]
+    hint = page.find("header .hint").rect
+    assert hint["width"] > hint["height"]  # it is a line, and no column of single words
     # no card lies on another
     overlaps = page.run(
         "const all = [...document.querySelectorAll('section, header, .notice')]"

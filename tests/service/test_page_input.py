@@ -159,6 +159,7 @@ def test_a_contact_is_rigid_by_a_choice(open_page: Any, surrogate: Surrogate) ->
     assert "k=rigid" in page.address()
     assert page.shown()["ṽ"] == "∞"
     assert "rigid contact has no point" in page.text("#map-read")
+    assert not page.find("#map-section .title .hint").is_displayed()  # no point to drag
     page.touched("#map", 0.5, 0.5, click=True)
     assert page.value("#field-v0") == "10 mm/s"
     page.click("[name=contact][value=spring]")
@@ -291,7 +292,9 @@ def test_a_step_of_a_drag_draws_the_point_and_its_end_the_rest(open_page: Any) -
         assert f"y0={amplitude} " in page.value("#copy-text")
     assert len(places) == 5
     assert page.run("return window.drawn;") == 0  # the map below the point stays
+    assert page.is_old("#advice")  # its words wait for the end of the drag
     page.drag_ends()
+    assert not page.is_old("#advice")
     law = page.find("#law").get_attribute("aria-label")
     again = open_page("#" + page.address(), width=1280, height=800)
     assert again.find("#law").get_attribute("aria-label") == law

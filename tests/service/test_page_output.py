@@ -740,6 +740,17 @@ def test_any_motion_is_computed_drawn_and_solved(open_page: Any) -> None:
     assert page.number("#motion-values dd") == close(0.15, abs=1e-5)
 
 
+def test_the_path_of_a_motion_fills_its_frame(open_page: Any) -> None:
+    for motion in ("x=2 um&y=", "x=&y=2 um", "x=2 um&y=0.1 um @ 90 deg"):
+        page = open_page(f"#panel=motion&normal=&{motion}", width=1280, height=800)
+        shares = page.run(
+            "const [path, frame] = ['.curve', 'clipPath rect'].map((one) =>"
+            " document.querySelector(`#path ${one}`).getBBox());"
+            "return [path.width / frame.width, path.height / frame.height];"
+        )
+        assert 0.75 <= max(shares) <= 1.0, motion
+
+
 @pytest.mark.parametrize("y", ["0.5 um@90", "40 nm"])  # forces that end together, long numbers
 def test_no_text_of_the_plots_of_a_motion_covers_another(open_page: Any, y: str) -> None:
     case = "contact=ball&Fz=20 N&k=10.6 N/um&f=40 kHz&v0=5 mm/s"

@@ -96,8 +96,9 @@ export function motionPanel(store, moved) {
 
   /** What was understood of an oscillation, where that says more than its text: its terms. */
   function understood(name) {
+    const typed = store.state[name].trim();
     const one = motion?.inputs[name];
-    if (!one || one.text !== store.state[name].trim()) return "amplitude, and @ phase in degrees";
+    if (one?.text !== typed) return typed && "amplitude, and @ phase in degrees";
     const term = ({ harmonic, amplitude, phase }) =>
       `${harmonic > 1 ? `${harmonic}: ` : ""}${inUnit(LIKE[name], amplitude)} at ${show(phase)}°`;
     const terms = one.harmonics.map(term).join(", ");
