@@ -25,7 +25,7 @@ columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [u
   mu0 [-]   Fz [N]   k [N/m]   y0 [m]   omega [rad/s] or f [Hz]   v0 [m/s]
   "rigid" in k is a rigid contact, an empty cell is missing; without a column k give --rigid
   also k_low and k_high; Fz_amplitude [N]; contact, direction, std_k, ...; others are copied
-in text the head is the first line with these names; units may stand beside it, or in a legend
+in text the header is the first line with these names; units may be in it, near it or in a legend
 added: mu_macro, mu_ratio, regime, error_bound, source; mu_macro_low, _high; power.saved, ...
 rejected rows are in OUT.rejects.csv only: line (of Parquet row, from 1), field, value, reason
 

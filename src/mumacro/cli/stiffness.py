@@ -50,8 +50,7 @@ def run(words: Sequence[str]) -> str:
     """Run ``mumacro stiffness``."""
     parser = OneLineParser(
         prog="mumacro stiffness",
-        description="The tangential stiffness k of a contact from materials and geometry, and the "
-        "kind of the contact.",
+        description="The tangential stiffness k of a contact from materials and geometry.",
         epilog=f"example:\n  {EXAMPLE}\n\nThe arguments of each: mumacro stiffness ball --help.",
     )
     parts = parser.add_subparsers(dest="geometry", required=True, metavar="GEOMETRY")
