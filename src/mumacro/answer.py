@@ -9,7 +9,7 @@ import numpy as np
 from mumacro import plotting
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.doubts import remarks as doubts
-from mumacro.inputs.fields import AMPLITUDE, RAD_PER_CYCLE, Kind
+from mumacro.inputs.fields import AMPLITUDE, Kind
 from mumacro.notes import Note
 from mumacro.results import Result, Rows, cell
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
@@ -112,9 +112,9 @@ class Answer(Result, Generic[Number]):
         self.source_code = source_code
         self._groups = groups
         self._cases: Cases | None = cases
-        #: for one case as plain numbers, instead of cases: contact and direction, the six inputs,
-        #: whether f was given
-        self._plain: tuple[Kind, tuple[float, ...], bool]
+        #: instead of cases, which are made when they are looked at: contact and direction, the six
+        #: inputs as numbers or arrays of doubles, whether f was given
+        self._plain: tuple[Kind, tuple[Any, ...], bool]
         self._surrogate = surrogate
         self.gradient = self.gradient_bound = None
         self.outputs: Mapping[str, Any] = _NOTHING
@@ -224,8 +224,10 @@ class Answer(Result, Generic[Number]):
         """Return the cases that were evaluated."""
         if self._cases is None:
             kind, six, with_f = self._plain
-            columns: dict[str, Any] = dict(zip(kind.fields, map(float, six), strict=True))
-            self._cases = Cases(kind, columns, (), f=six[4] / RAD_PER_CYCLE if with_f else None)
+            names = [*kind.fields]
+            if with_f:
+                names[4] = "f"
+            self._cases = Cases.of(dict(zip(names, six, strict=True)), kind)
         return self._cases
 
     @property

@@ -21,6 +21,7 @@ from mumacro.inputs.cases import (
     COLUMNS,
     Absent,
     Cases,
+    angular,
     has_labels,
     named,
     no_such_input,
@@ -60,6 +61,7 @@ _FLOAT = np.dtype(np.float64)
 ILLEGAL = ("nan", "raise")
 _WORDS = (Absent, str)
 _SIMPLE = NUMBERS | {np.ndarray, str}
+_NUMBERS_OR_ARRAYS = NUMBERS | {np.ndarray}
 _SIX_WITH_F = tuple("f" if name == "omega" else name for name in FIELDS)
 _OPTIONS: dict[str, Any] = {"include": (), "gradient": False, "illegal": "nan"}
 _SHORT: dict[Any, Kind] = {ABSENT: SPRING, "spring": SPRING, "ball": BALL}
@@ -584,8 +586,8 @@ class Surrogate:
             and type(illegal) is str
             and illegal == "nan"
         ):
-            # One case across in plain numbers takes this short path, in a third of the time.  Cases
-            # that it cannot answer take the long path, which has the messages.
+            # Plain numbers and arrays of doubles take this short path, in half of the time or less.
+            # Cases that it cannot answer take the long path, which has the messages.
             six = (mu0, Fz, k, y0, omega if f is ABSENT else f, v0)
             types = {*map(type, six)}
             if types <= NUMBERS and not include and not (gradient and k == math.inf):
@@ -593,6 +595,10 @@ class Surrogate:
                     answer = self._one(six, f is not ABSENT, gradient, _SHORT[contact])
                     if answer.source_code >= 0:
                         return answer
+            if types <= _NUMBERS_OR_ARRAYS and not include and not gradient:
+                with suppress(OverflowError):
+                    if (shape := _shape_of_doubles(six)) is not None:
+                        return self._many(six, f is not ABSENT, shape, _SHORT[contact])
             if types <= _SIMPLE:  # no other type has to be looked for
                 fields = FIELDS if f is ABSENT else _SIX_WITH_F
                 of_six = Cases.of(dict(zip(fields, six, strict=True)), _SHORT[contact])
@@ -641,8 +647,22 @@ class Surrogate:
 
         return of_one_case(answer)
 
+    def _many(
+        self, six: tuple[Any, ...], with_f: bool, shape: tuple[int, ...], kind: Kind
+    ) -> Answer[Array]:
+        """Return the answer to cases across in numbers and arrays (n,), NaN at an illegal case."""
+        columns = [x if type(x) is np.ndarray else float(x) for x in six]
+        if with_f:
+            columns[4] = angular(columns[4])
+        rows = self.tabulated.many(columns, shape, "values", kind)
+        numbers = rows.mu_macro, rows.mu_ratio, rows.error_bound
+        answer = Answer(*numbers, rows.source, None, None, self)
+        answer._plain = kind, six, with_f
+        return answer
+
     def _one(self, six: tuple[Any, ...], with_f: bool, gradient: bool, kind: Kind) -> Answer[float]:
         """Return the answer to one case across in plain numbers, NaN if it is illegal."""
+        plain = six
         if with_f:
             six = (*six[:4], RAD_PER_CYCLE * float(six[4]), six[5])
         row = self.tabulated.one(six, gradient, kind.contact)
@@ -655,7 +675,7 @@ class Surrogate:
             None,
             self,
         )
-        answer._plain = kind, six, with_f
+        answer._plain = kind, plain, with_f
         if gradient:
             slopes, bounds = tuple(row.gradient), tuple(row.gradient_bound)
             answer.gradient = dict(zip(FIELDS, slopes, strict=True))
@@ -684,6 +704,20 @@ def _reopen(path: str, checksum: str, threads: int | None, image: bytes | None) 
         )
         raise TableError(surrogate.path, f"{mismatch}: install the same release on both sides")
     return surrogate
+
+
+def _shape_of_doubles(six: tuple[Any, ...]) -> tuple[int, ...] | None:
+    """Return the shape (n,) of the arrays of doubles among the inputs; None where they have several
+    shapes, another type or another layout."""
+    shape: tuple[int, ...] = ()
+    for x in six:
+        if type(x) is np.ndarray:
+            if x.ndim != 1 or x.dtype is not _FLOAT or not x.flags.carray:
+                return None
+            if x.shape != (shape or x.shape):
+                return None
+            shape = x.shape
+    return shape if shape > (0,) else None
 
 
 def _illegal(v: Array, y: Array, bound: str = "finite and >= 0") -> InputError:

@@ -575,7 +575,7 @@ def _inputs(values: Mapping[str, Any], fields: tuple[str, ...]) -> _Inputs:
                 ends = one.low, one.high
         if source == "f":
             f = value
-            value = RAD_PER_CYCLE * value if type(value) is float else _angular(value)
+            value = RAD_PER_CYCLE * value if type(value) is float else angular(value)
         columns[name] = value
     return _Inputs(columns, std, ends, units, f, gaps)
 
@@ -668,7 +668,7 @@ def _missing(values: Mapping[str, Any], fields: tuple[str, ...]) -> InputError:
 
 
 @np.errstate(over="ignore")  # faster than a with statement in the function
-def _angular(frequency: float | Array) -> float | Array:
+def angular(frequency: float | Array) -> float | Array:
     """Return omega [rad/s] of f [Hz].  Beyond double range it is infinite, which is later refused
     as a value of f."""
     return frequency * RAD_PER_CYCLE
