@@ -250,6 +250,14 @@ def test_the_map_is_read_and_moved_on(open_page: Any, surrogate: Surrogate) -> N
     assert page.number() == close(0.3 * surrogate.mu_ratio(*shown), abs=2e-3)
 
 
+def test_another_direction_is_chosen_while_the_pointer_is_on_the_map(open_page: Any) -> None:
+    page = open_page()
+    page.touched("#map", 0.5, 0.4)
+    page.wait_for("#map-read", "y₀ = ")
+    page.click("[name=direction][value=normal]")
+    page.wait_for("#map-read", "ΔFz = ")
+
+
 OUTSIDE = (
     ("#v0=1e6 m/s", (1, 0), "ṽ = 2650000"),
     ("#v0=0", (-1, 0), "ṽ = 0"),

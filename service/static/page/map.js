@@ -235,9 +235,8 @@ export function mapPanel(store, moved, loaded) {
       const unit = unitAt(name, value, answer.inputs[name].unit);
       return `${about.inputs[name].symbol} = ${inUnit(name, value, unit, 3)}`;
     };
-    const words = size
-      ? `${own("v0", v * size.v0)}, ${own(amplitude(), y * size[amplitude()])}; `
-      : "";
+    const up = size && inputsOf(answer.state)[3]; // an answer may be to another direction
+    const words = size ? `${own("v0", v * size.v0)}, ${own(up, y * size[up])}; ` : "";
     write("map-read", whole(`At the pointer: ${words}${there}`));
   }
 
