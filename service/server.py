@@ -25,6 +25,8 @@ _PIECE = 2048  # bytes of the headers that are read before they are counted
 # seconds after the deadline of an answer, which the application itself keeps if it can
 _MARGIN_S = 2.0
 _LOOK_EVERY_S = 0.25  # seconds between two checks whether the time of a connection is over
+# how long the answer to a client that has closed its side may take to begin
+_CLOSED_SIDE_S = 5.0
 _TOO_LARGE = RequestError(
     ProblemKind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes"
 )
@@ -180,12 +182,22 @@ class Connection(HttpToolsProtocol):
         super().connection_lost(exc)
 
     def eof_received(self) -> bool:  # type: ignore[override]
-        """Answer a complete request of a client that has closed its side."""
+        """Answer a complete request of a client that has closed its side, if the answer begins
+        soon: most clients that close their side have gone."""
         self.transport.flush()
         if not self._busy or self.cycle.more_body:
             return False
         self.cycle.keep_alive = False
+        self.loop.call_later(_CLOSED_SIDE_S, self._end_unanswered, self.cycle)
         return True
+
+    def _end_unanswered(self, cycle: Any) -> None:
+        """End a request whose answer has not begun; the application sees that the client has
+        gone."""
+        if not cycle.response_started and not cycle.disconnected:
+            cycle.disconnected = True
+            cycle.message_event.set()
+            self.transport.close()
 
     def data_received(self, data: bytes) -> None:
         """Read bytes, unless they follow a request that is not answered yet."""
