@@ -31,8 +31,11 @@ export function afterPicture(work) {
     setTimeout(() => {
       const now = next;
       next = null;
-      now();
-      markBusy(afterPicture, false);
+      try {
+        now();
+      } finally {
+        markBusy(afterPicture, false);
+      }
     }),
   );
 }
