@@ -112,9 +112,9 @@ class Answer(Result, Generic[Number]):
         self.source_code = source_code
         self._groups = groups
         self._cases: Cases | None = cases
-        #: instead of cases, which are made when they are looked at: contact and direction, the six
-        #: inputs as numbers or arrays of doubles, whether f was given
-        self._plain: tuple[Kind, tuple[Any, ...], bool]
+        #: instead of cases, which are made when they are looked at: contact and direction, the
+        #: names of the six inputs, and the inputs as numbers or arrays of doubles
+        self._plain: tuple[Kind, tuple[str, ...], tuple[Any, ...]]
         self._surrogate = surrogate
         self.gradient = self.gradient_bound = None
         self.outputs: Mapping[str, Any] = _NOTHING
@@ -223,10 +223,7 @@ class Answer(Result, Generic[Number]):
     def cases(self) -> Cases:
         """Return the cases that were evaluated."""
         if self._cases is None:
-            kind, six, with_f = self._plain
-            names = [*kind.fields]
-            if with_f:
-                names[4] = "f"
+            kind, names, six = self._plain
             self._cases = Cases.of(dict(zip(names, six, strict=True)), kind)
         return self._cases
 

@@ -60,8 +60,8 @@ _FLOAT = np.dtype(np.float64)
 #: effects of an illegal value in an array
 ILLEGAL = ("nan", "raise")
 _WORDS = (Absent, str)
-_SIMPLE = NUMBERS | {np.ndarray, str}
 _NUMBERS_OR_ARRAYS = NUMBERS | {np.ndarray}
+_SIMPLE = _NUMBERS_OR_ARRAYS | {str}
 _SIX_WITH_F = tuple("f" if name == "omega" else name for name in FIELDS)
 _OPTIONS: dict[str, Any] = {"include": (), "gradient": False, "illegal": "nan"}
 _SHORT: dict[Any, Kind] = {ABSENT: SPRING, "spring": SPRING, "ball": BALL}
@@ -588,20 +588,20 @@ class Surrogate:
         ):
             # Plain numbers and arrays of doubles take this short path, in half of the time or less.
             # Cases that it cannot answer take the long path, which has the messages.
+            names = FIELDS if f is ABSENT else _SIX_WITH_F
             six = (mu0, Fz, k, y0, omega if f is ABSENT else f, v0)
             types = {*map(type, six)}
             if types <= NUMBERS and not include and not (gradient and k == math.inf):
                 with suppress(OverflowError):  # a whole number beyond double range
-                    answer = self._one(six, f is not ABSENT, gradient, _SHORT[contact])
+                    answer = self._one(names, six, gradient, _SHORT[contact])
                     if answer.source_code >= 0:
                         return answer
             if types <= _NUMBERS_OR_ARRAYS and not include and not gradient:
                 with suppress(OverflowError):
                     if (shape := _shape_of_doubles(six)) is not None:
-                        return self._many(six, f is not ABSENT, shape, _SHORT[contact])
+                        return self._many(names, six, shape, _SHORT[contact])
             if types <= _SIMPLE:  # no other type has to be looked for
-                fields = FIELDS if f is ABSENT else _SIX_WITH_F
-                of_six = Cases.of(dict(zip(fields, six, strict=True)), _SHORT[contact])
+                of_six = Cases.of(dict(zip(names, six, strict=True)), _SHORT[contact])
                 return self.answer(of_six, chosen(include, of_six, gradient))
         for name, value in unknown_names.items():
             raise no_such_input(name, value)
@@ -626,8 +626,8 @@ class Surrogate:
             raise InputError("gradient", gradient, "True or False")
         strict = illegal == "raise"
         if is_labelled:
-            names = [*names_in(include), *["gradient"] * bool(gradient)]
-            return evaluate_labelled(self, cases, values, names, strict)
+            included = [*names_in(include), *["gradient"] * bool(gradient)]
+            return evaluate_labelled(self, cases, values, included, strict)
         of_values = Cases.of(values, strict=strict)
         return self.answer(of_values, chosen(include, of_values, gradient))
 
@@ -648,24 +648,26 @@ class Surrogate:
         return of_one_case(answer)
 
     def _many(
-        self, six: tuple[Any, ...], with_f: bool, shape: tuple[int, ...], kind: Kind
+        self, names: tuple[str, ...], six: tuple[Any, ...], shape: tuple[int, ...], kind: Kind
     ) -> Answer[Array]:
         """Return the answer to cases across in numbers and arrays (n,), NaN at an illegal case."""
         columns = [x if type(x) is np.ndarray else float(x) for x in six]
-        if with_f:
+        if names is _SIX_WITH_F:
             columns[4] = angular(columns[4])
         rows = self.tabulated.many(columns, shape, "values", kind)
         numbers = rows.mu_macro, rows.mu_ratio, rows.error_bound
         answer = Answer(*numbers, rows.source, None, None, self)
-        answer._plain = kind, six, with_f
+        answer._plain = kind, names, six
         return answer
 
-    def _one(self, six: tuple[Any, ...], with_f: bool, gradient: bool, kind: Kind) -> Answer[float]:
+    def _one(
+        self, names: tuple[str, ...], six: tuple[Any, ...], gradient: bool, kind: Kind
+    ) -> Answer[float]:
         """Return the answer to one case across in plain numbers, NaN if it is illegal."""
-        plain = six
-        if with_f:
-            six = (*six[:4], RAD_PER_CYCLE * float(six[4]), six[5])
-        row = self.tabulated.one(six, gradient, kind.contact)
+        fields = six
+        if names is _SIX_WITH_F:
+            fields = (*six[:4], RAD_PER_CYCLE * float(six[4]), six[5])
+        row = self.tabulated.one(fields, gradient, kind.contact)
         answer: Answer[float] = Answer(
             row.mu_macro,
             row.mu_ratio,
@@ -675,7 +677,7 @@ class Surrogate:
             None,
             self,
         )
-        answer._plain = kind, plain, with_f
+        answer._plain = kind, names, six
         if gradient:
             slopes, bounds = tuple(row.gradient), tuple(row.gradient_bound)
             answer.gradient = dict(zip(FIELDS, slopes, strict=True))

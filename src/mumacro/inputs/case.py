@@ -34,7 +34,7 @@ _DEVIATIONS = ("±", "+/-", "+-")
 #: quantities that may be the word rigid, or an interval
 OR_RIGID = ("stiffness", "pressure")
 _INTERVAL = "two stiffnesses [N/m] with 0 < low <= high, both finite"
-_IN_RANGE = "at most 1.8e308, the largest number there is"
+_IN_RANGE = "at most 1.8e308 in SI, the largest number there is"
 _GAPS = ("NAType", "NaTType")  # types of pandas, by name
 _ONE_NUMBER = "one number: k alone may be an interval; ask for both ends, one after the other"
 #: commands whose answer has no deviation
@@ -247,7 +247,7 @@ def _in_si(name: str, shown: str, number: float, scale: Scale) -> float:
     a rigid contact."""
     si = scale.si(number)
     if math.isinf(si) and math.isfinite(number):
-        raise InputError(name, shown, "at most 1.8e308 in SI, the largest number there is")
+        raise InputError(name, shown, _IN_RANGE)
     return si
 
 
