@@ -14,6 +14,8 @@ from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter, process_time
 
+from tests.support.documents import PAGES
+
 for _name in (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -27,22 +29,6 @@ RESULTS = ROOT / "build" / "results"
 IMAGES = ROOT / "docs" / "img"
 PACKAGES = ("numpy", "scipy", "numba", "h5py", "pyarrow", "dask", "xarray", "uvicorn")
 FINEST = ROOT / "tables" / "mumacro-1e-12.nc"
-#: the documents that hold results, each between a begin and an end marker with the name of its
-#: section; or its table alone, between "begin SCRIPT-SECTION, table" and "end SCRIPT-SECTION"
-PAGES = tuple(
-    ROOT / path
-    for path in (
-        "README.md",
-        "docs/accuracy.md",
-        "docs/speed-and-error.md",
-        "docs/python.md",
-        "docs/operations.md",
-        "docs/validation.md",
-        "docs/how-to/friction-models.md",
-        "docs/measured.md",
-        "tables/README.md",
-    )
-)
 
 
 def sections(*each: Callable[..., str]) -> dict[str, Callable[..., str]]:
