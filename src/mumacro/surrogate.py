@@ -586,8 +586,8 @@ class Surrogate:
             and type(illegal) is str
             and illegal == "nan"
         ):
-            # Plain numbers and arrays of doubles take this short path, in half of the time or less.
-            # Cases that it cannot answer take the long path, which has the messages.
+            # Plain numbers take this short path in a third of the time; arrays of doubles take it,
+            # too.  Cases that it cannot answer take the long path, which has the messages.
             names = FIELDS if f is ABSENT else _SIX_WITH_F
             six = (mu0, Fz, k, y0, omega if f is ABSENT else f, v0)
             types = {*map(type, six)}
