@@ -2,6 +2,7 @@
 of the range."""
 
 import inspect
+import itertools
 import math
 import re
 from collections.abc import Callable
@@ -325,6 +326,24 @@ def test_cases_and_keywords_go_together_without_overlap(table: Surrogate) -> Non
     for bad in ([1.0], 3.0, "cases", object()):
         with refused("cases"):
             table.evaluate(bad)
+
+
+@pytest.mark.parametrize("contact", ["spring", "ball"])
+def test_arrays_by_keyword_and_in_a_mapping_have_the_same_bits(
+    table: Surrogate, contact: str
+) -> None:
+    """Keywords take a shorter path than a mapping; numbers and arrays at both ends of the range
+    are among them."""
+    ends = (0.0, -0.0, -1.0, 5e-324, 1e-300, 1e300, 1.7e308, math.inf, math.nan)
+    for name, other in itertools.permutations(CASE, 2):
+        for array in ([CASE[name]], [CASE[name], 3.0 * CASE[name]], ends):
+            for number in (CASE[other], 7, ends[0], *ends[-3:]):
+                case = {**CASE, name: np.array(array), other: number}
+                short = table.evaluate(**case, contact=contact)
+                long = table.evaluate({**case, "contact": contact})
+                for path in ("mu_macro", "mu_ratio", "error_bound", "source_code"):
+                    assert getattr(short, path).tobytes() == getattr(long, path).tobytes()
+                assert repr(short.cases) == repr(long.cases)
 
 
 OPTIONS: dict[str, list[Any]] = {
