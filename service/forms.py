@@ -188,7 +188,11 @@ def _numbers_in(
     kind = (x if x is None or isinstance(x, str) else "" for x in map(row.get, KIND))
     targets = targets_of(tuple(row), *kind)
     if isinstance(targets, Reason):
-        return targets
+        if not targets.text:  # an unknown name
+            return targets
+        # as for one case, a bad value is told before a fault between names
+        reasons = ((name, entry(name, x)[1]) for name, x in row.items() if name in _NUMBERS)
+        return next((Reason(name, text) for name, text in reasons if text), targets)
     numbers = {}
     for name, (column, unit) in targets.items():
         number, reason = entry(name, row[name])

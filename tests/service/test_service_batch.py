@@ -298,6 +298,7 @@ BESIDE_AN_INTERVAL = ("k", "must be finite beside rows with an interval of k")
 @settings(max_examples=60, deadline=None)
 @given(rows=CASES)
 @example(rows=[{**SPRING, "k": 1e6, "contact": name} for name in ("ball", "cube")])
+@example(rows=[{**LIFTED, "k": 1e6, "y0": True}])
 def test_rows_are_answered_and_refused_like_each_of_them_alone(client: Any, rows: Any) -> None:
     answer = client.post(BATCH, json=rows).json()
     faults = {fault["index"]: (fault["field"], fault["reason"]) for fault in answer["errors"]}
