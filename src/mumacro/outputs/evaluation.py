@@ -129,9 +129,8 @@ def evaluate_cases(
 def _of_one(case: Evaluated, outputs: tuple[Output, ...]) -> Answer[float]:
     """Return the answer to one case, in plain numbers."""
     values: Values = {}
-    with np.errstate(all="ignore"):
-        for output in outputs:
-            values |= output.compute(case)
+    for output in outputs:
+        values |= output.compute(case)
     cases = case.cases
     answer: Answer[Any] = Answer(
         case.mu_macro,

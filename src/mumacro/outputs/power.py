@@ -20,20 +20,20 @@ _DENORMAL = 1e-323  # two times the smallest double
 def power(cases: Evaluated) -> Values:
     """Return the power of the shaker, mu0 Fz l0 omega <y~ cos tau u_y>, and the power that the
     drive saves, (mu0 - mu_macro) Fz v0."""
-    mu0, load, omega, v0 = (cases.columns[name] for name in ("mu0", "Fz", "omega", "v0"))
-    v, y = (where(cases.usable, group, 1.0) for group in (cases.v_tilde, cases.y_tilde))
+    mu0, load, _, _, omega, v0 = cases.columns.values()
+    usable, moving, length = cases.usable, cases.moving, cases.length_scale
+    v, y = where(usable, cases.v_tilde, 1.0), where(usable, cases.y_tilde, 1.0)
     number, bound = cases.quantity("power", v, y)
-    force, rate = mu0 * load, cases.length_scale * omega
-    unit = where(cases.usable, force * rate, math.nan)
-    shaker, shaker_bound = (where(cases.moving, x * unit, 0.0) for x in (number, bound))
+    force, rate = mu0 * load, length * omega
+    unit = where(usable, force * rate, math.nan)
+    shaker, shaker_bound = where(moving, number * unit, 0.0), where(moving, bound * unit, 0.0)
     saved = (mu0 - cases.mu_macro) * load * v0
-    saved_bound = cases.error_bound * load * v0 + ROUNDING * abs(saved)
     size: Any = abs(saved)
+    saved_bound = cases.error_bound * load * v0 + ROUNDING * size
     # first the power of the drive, then that of the shaker
     driven = (mu0 > _LEAST) & ((cases.mu_macro == mu0) | (size > _LEAST)) & (size < _MOST)
     plain = driven & (v < math.inf)
-    products: tuple[Any, ...] = mu0, force, cases.length_scale, rate, unit, shaker
-    for product in products:
+    for product in (mu0, force, length, rate, unit, shaker):
         plain = plain & (product > _LEAST) & (product < _MOST)
     values = [shaker, saved, shaker_bound, saved_bound]
     if not (plain.all() if isinstance(plain, np.ndarray) else plain):
