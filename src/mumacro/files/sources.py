@@ -4,8 +4,10 @@
 cells: inputs as numbers, other columns as text.
 """
 
+import functools
 import glob
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,13 +19,13 @@ import pyarrow.dataset
 
 from mumacro.errors import TextError
 from mumacro.files.record_batch import FilesError
-from mumacro.inputs.account import ColumnNames
+from mumacro.inputs.account import NO_ROW, ColumnNames
 from mumacro.inputs.carried import units_of_fields
-from mumacro.inputs.cells import GAPS, joined
+from mumacro.inputs.cells import BLANKS, GAPS, joined, split_row
+from mumacro.inputs.decoding import Piece
 from mumacro.inputs.layout import Dialect, Layout
 from mumacro.inputs.numbers import Signs
 from mumacro.inputs.text_tables import Rows, TextTable
-from mumacro.kernel.arrays import Places
 
 #: extensions of files that can be written, and their format
 WRITTEN = {
@@ -118,7 +120,7 @@ class RowBlock(NamedTuple):
     batch: pa.RecordBatch  #: the rows; nulls in a row that could not be read
     share: float  #: fraction of the file that is read after them
     #: line numbers in the file, or row numbers from 1 if it has no lines
-    lines: Sequence[int] | Places
+    lines: Sequence[int]
     #: by index: the text of a row that could not be read, and the reason
     faults: Mapping[int, tuple[str, str]] = {}
     signs: Signs | None = None  #: the separators in numbers as text
@@ -128,7 +130,7 @@ class RowBlock(NamedTuple):
     def value(self, i: int, name: str) -> str | None:
         """Return a cell as it is in the file."""
         if self.rows is not None:
-            return self.rows.of(i)[self.heads.index(name)]
+            return split_row(self.rows.texts[i], self.rows.sep)[self.heads.index(name)]
         cell = self.batch.column(name)[i].as_py()
         return None if cell is None else str(cell)
 
@@ -229,71 +231,119 @@ class TextSource:
             place = byte
 
         try:
-            for rows in table.rows(report_place):
-                table.see_signs(rows)
-                batch = pa.RecordBatch.from_arrays(_columns(rows, table, names), [*names])
-                share, heads = place / size, table.layout.heads
+            for piece in table.pieces(report_place):
+                rows, columns = _plain_rows(piece, table) or _rows_one_by_one(piece, table)
+                heads = table.layout.heads
+                arrays = [columns[heads.index(name)] for name in names]
+                batch = pa.RecordBatch.from_arrays(arrays, [*names])
+                share = place / size
                 yield RowBlock(batch, share, rows.lines, rows.faults, table.signs, rows, heads)
         except TextError as error:
             raise FilesError(f"{path}: {error}") from None
 
 
-def _columns(rows: Rows, table: TextTable, names: Sequence[str]) -> list[pa.Array]:
-    """Return the columns of rows: inputs as numbers, or as text if a cell is not a plain number."""
-    places = {head: str(i) for i, head in enumerate(table.layout.heads)}
-    as_text = dict.fromkeys((places[name] for name in names), pa.string())
-    inputs = {str(i) for i in table.layout.inputs}.intersection(as_text)
+def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] | None:
+    """Return the rows in some lines, and their columns, if every line is a row that Arrow reads:
+    each input is a number or a gap, and no cell may begin a comment or a row of statistics.  Return
+    None if the lines must be examined one by one."""
+    account, text, sep = table.account, piece.text, table.account.sep
+    shows_signs = "." in text or ('"' if sep == "," else ",") in text
+    if (
+        table.layout.sep == BLANKS
+        or table.open_row
+        or account.name in text
+        or (shows_signs and not table.signs.decimal)
+        or ('"' in text and not _quotes_surround_cells(text, sep))
+    ):
+        return None
     try:
-        types = as_text | dict.fromkeys(inputs, pa.float64())
-        columns = _read(rows, len(places), types, table.signs.decimal or ".")
-        # a number with too many digits must not become a rigid contact
-        if not any(pc.any(pc.is_inf(columns[i])).as_py() for i in inputs):
-            return [columns[places[name]] for name in names]
+        columns = _read(text, table, table.layout.inputs)
     except pa.ArrowInvalid:
-        pass
-    columns = _read(rows, len(places), as_text, ".")
-    return [columns[places[name]] for name in names]
+        return None
+    lines = piece.lines
+    numbers = [columns[i] for i in table.layout.inputs]
+    texts = [column for i, column in enumerate(columns) if i not in table.layout.inputs]
+    has_number = functools.reduce(pc.or_, map(pc.is_valid, numbers))
+    if (
+        len(has_number) != len(lines)
+        or not pc.all(has_number).as_py()
+        or _has_infinity(numbers)
+        or any(map(_may_begin_no_row, texts))
+    ):
+        return None
+    account.units.rows_begun = True
+    return Rows(sep, lines, range(piece.first, piece.first + len(lines)), {}), columns
 
 
-def _read(
-    rows: Rows, width: int, types: Mapping[str, pa.DataType], decimal: str
-) -> dict[str, pa.Array]:
-    if not rows.data or not types:
-        return {name: pa.array([], arrow_type) for name, arrow_type in types.items()}
-    table = pa.csv.read_csv(
-        pa.BufferReader(rows.data),
-        pa.csv.ReadOptions(
-            use_threads=False,
-            block_size=len(rows.data) + 1,
-            column_names=[*map(str, range(width))],
-        ),
+def _rows_one_by_one(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]]:
+    """Return the rows in some lines, and their columns: inputs as numbers, or all as text if a cell
+    is not a plain number."""
+    rows = table.rows_in(piece)
+    table.see_signs(rows)
+    text, inputs = "\n".join(rows.texts), table.layout.inputs
+    if not rows.texts:
+        types = _types(table, inputs)
+        return rows, [pa.array([], arrow_type) for arrow_type in types.values()]
+    with suppress(pa.ArrowInvalid):
+        columns = _read(text, table, inputs)
+        if not _has_infinity([columns[i] for i in inputs]):
+            return rows, columns
+    return rows, _read(text, table, ())
+
+
+def _has_infinity(columns: Iterable[pa.Array]) -> bool:
+    """Return whether a number has too many digits, which must not become a rigid contact."""
+    return any(pc.any(pc.is_inf(column)).as_py() for column in columns)
+
+
+def _may_begin_no_row(column: pa.Array) -> bool:
+    """Return whether a text may begin a comment or a row of statistics."""
+    return bool(pc.any(pc.match_substring_regex(column, NO_ROW, ignore_case=True)).as_py())
+
+
+def _quotes_surround_cells(text: str, sep: str) -> bool:
+    """Return whether each quote begins or ends a cell, or is one of two within it."""
+    data = f"\n{text}\n".encode()
+    signs = np.frombuffer(data, np.uint8)
+    quotes = np.flatnonzero(signs == ord('"'))
+    is_beside = np.isin(np.arange(256), [ord(sign) for sign in (sep, "\n", '"')])
+    before, behind = is_beside[signs[quotes[::2] - 1]], is_beside[signs[quotes[1::2] + 1]]
+    return quotes.size % 2 == 0 and bool(before.all() and behind.all())
+
+
+def _types(table: TextTable, numbers: Container[int]) -> dict[str, pa.DataType]:
+    """Return the types of the columns by their index as text: doubles for ``numbers``."""
+    return {
+        str(i): pa.float64() if i in numbers else pa.string() for i in range(table.account.width)
+    }
+
+
+def _read(text: str, table: TextTable, numbers: Container[int]) -> list[pa.Array]:
+    """Return the columns of rows, some of them as ``numbers``.  Raise ArrowInvalid if a line has
+    another number of cells, or a cell no number."""
+    data, types = text.encode(), _types(table, numbers)
+    read = pa.csv.read_csv(
+        pa.BufferReader(data),
+        pa.csv.ReadOptions(use_threads=False, block_size=len(data) + 1, column_names=[*types]),
         pa.csv.ParseOptions(
-            delimiter=rows.sep,
-            quote_char='"' if rows.has_quotes else False,
+            delimiter=table.account.sep,
+            quote_char='"' if b'"' in data else False,
             ignore_empty_lines=False,
-            newlines_in_values=not rows.is_cut_by_lines,
+            newlines_in_values=True,
         ),
         pa.csv.ConvertOptions(
             check_utf8=False,
             column_types=types,
             null_values=_NULLS,
             strings_can_be_null=False,
-            include_columns=[*types],
-            decimal_point=decimal,
+            decimal_point=table.signs.decimal or ".",
         ),
     )
-    return {name: table.column(name).combine_chunks() for name in types}
+    return [column.combine_chunks() for column in read.columns]
 
 
 def lines_of(rows: Rows, sep: str) -> pa.Array:
     """Return rows as they are in the file, as an array of texts.  With another separator, put cells
     in quotes where they need it."""
-    if sep != rows.sep:
-        return pa.array([joined(cells, sep) for cells in rows.cells()], pa.string())
-    count = rows.ends.size
-    offsets = np.concatenate([[0], rows.ends - np.arange(count)]).astype(np.int32)
-    if rows.is_cut_by_lines:
-        text = rows.data.replace(b"\n", b"")
-    else:
-        text = np.delete(np.frombuffer(rows.data, np.uint8), rows.ends).tobytes()
-    return pa.StringArray.from_buffers(count, pa.py_buffer(offsets), pa.py_buffer(text))
+    texts = rows.texts if sep == rows.sep else [joined(cells, sep) for cells in rows.cells()]
+    return pa.array(texts, pa.string())

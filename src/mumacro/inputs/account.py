@@ -12,6 +12,7 @@ from typing import NamedTuple
 from mumacro.errors import TextError
 from mumacro.inputs.cells import (
     BLANKS,
+    COMMENT,
     is_comment,
     joined,
     may_be_value,
@@ -34,13 +35,9 @@ _STATISTICS = re.compile(
     r"|standardabweichung|stabw"
     r"|[ée]cart[ -]type)(?:\.? ?(?:value|wert|of .{1,20}))?\W*"
 )
-#: the first two letters of each of them
-BEGIN_OF_STATISTICS = frozenset(
-    (
-        *("me", "av", "mi", "mw", "mo", "ma", "su", "to", "ra"),
-        *("sp", "va", "co", "cv", "sd", "rs", "st", "ec", "s."),
-    )
-)
+#: what may begin a comment or a row of statistics, for a quick look at texts
+NO_ROW = rf"^\s*(?:{'|'.join(map(re.escape, COMMENT))}|{_STATISTICS.pattern}$)"
+_DIGITS = frozenset("0123456789")
 # a line drawn between rows has only these characters, some of them together
 _OF_RULER, _RULER = "-=_+|: \t,;", re.compile(r"-{4}|={3}|\+-{2}|\|:?-{3}")
 
@@ -109,6 +106,8 @@ class Account:
         """Return the text of a row, with as many cells as the header, and its fault.  Return None
         if the line is not a row."""
         width, empty = self.width, self.sep * (self.width - 1)
+        if self._is_plain(text):
+            return text, None
         if text.count(self.sep) > 2 * width + 1000 and not is_comment(text):  # too long to be split
             return empty, irregular(text.count(self.sep) + 1, width)
         if not self.is_row(line, text):
@@ -122,13 +121,23 @@ class Account:
             return text + self.sep, None
         return empty, irregular(len(cells), width)
 
+    def _is_plain(self, text: str) -> bool:
+        """Return whether a line needs no closer look, as most rows do: after the first row, all
+        inputs begin like numbers, and so does the first cell."""
+        if self.first is None or '"' in text or text.count(self.sep) != self.width - 1:
+            return False
+        cells = text.split(self.sep)
+        return 0 in self.units.inputs and all(
+            cells[i].lstrip("+-.")[:1] in _DIGITS for i in self.units.inputs
+        )
+
     def is_row(self, line: int, text: str) -> bool:
         """Return whether a line is a row.  Raise TextError if it has no meaning at all."""
         if not text.strip(f" \t{self.header.sep}"):
             return False
         if self._may_be_header(text) and self._repeats_header(line, text):
             return self._skip(line, again=True)
-        if is_comment(text) and not self._is_whole_row(text):
+        if is_comment(text) and not (self.has_name(text) and len(self._cells(text)) == self.width):
             if "\n" in text:
                 raise TextError(f"line {line}: a quote in a comment is not closed: leave it out")
             self.units.take(line, text, self._remedy_of_units(line))
@@ -176,15 +185,10 @@ class Account:
             return split_header(text, BLANKS)
         return split_row(text, self.sep)
 
-    def _is_whole_row(self, text: str) -> bool:
-        """Return whether a line that begins like a comment is a row whose first cell is a name such
-        as #1."""
-        cells = self._cells(text)
-        return (
-            0 not in self.units.inputs
-            and len(cells) == self.width > 1
-            and any(map(starts_as_number, cells[1:]))
-        )
+    def has_name(self, text: str) -> bool:
+        """Return whether a line that begins like a comment may be a row whose first cell is a name
+        such as #1."""
+        return 0 not in self.units.inputs and any(map(starts_as_number, self._cells(text)[1:]))
 
     def _remedy_of_units(self, line: int) -> str:
         return "leave one of them out" if self.first is None else self.remedy(line)

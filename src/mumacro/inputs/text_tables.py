@@ -7,23 +7,16 @@ numbers.
 """
 
 import csv
-import io
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mumacro.errors import TextError
-from mumacro.inputs.account import (
-    BEGIN_OF_STATISTICS,
-    Account,
-    ColumnNames,
-    names_statistics,
-)
+from mumacro.inputs.account import Account, ColumnNames, names_statistics
 from mumacro.inputs.cells import BLANKS, MOST_COLUMNS, is_comment, numbers_of, split_row
 from mumacro.inputs.decoding import LONGEST, Piece, Text, file_pieces
 from mumacro.inputs.layout import LOOKED_AT, Dialect, find_layout
@@ -31,36 +24,21 @@ from mumacro.inputs.names import absent, find_heads
 from mumacro.inputs.numbers import Cell
 from mumacro.inputs.units import in_si, too_large_in_si
 from mumacro.inputs.workbooks import BEGIN, SEP, read_sheet
-from mumacro.kernel.arrays import Array, Places
+from mumacro.kernel.arrays import Array
 
 _BETWEEN_BLANKS = re.compile(r'"[^"]*"|\S+')
 _BETWEEN = re.compile(r"[,;|\s]+")  # anything that separates cells
-_PAIRS = [(first, second) for first in map(chr, range(256)) for second in map(chr, range(256))]
-# by the first two bytes of a cell: whether it begins like a number
-_BEGINS_NUMBER = np.array(
-    [a.isascii() and (a.isdigit() or (a in "+-." and b in "0123456789.")) for a, b in _PAIRS]
+# by the separator: a quoted cell after blanks, any quoted cell, and a quote that begins a cell
+_BEHIND_BLANKS, _QUOTED, _OPEN_QUOTE = (
+    {sep: re.compile(pattern.replace("SEP", re.escape(sep))) for sep in ",;|\t"}
+    for pattern in (
+        r'(?<![^SEP\n]) ++("(?:[^"]++|"")*+"(?=SEP|\n|\Z))',
+        r'"(?<![^SEP\n]")(?:[^"]++|"")*+"(?=SEP|\n|\Z)',
+        r'(?<![^SEP\n]) *+"',
+    )
 )
-# by the first two bytes of a name: whether the line may be a comment, or begin with a word such as
-# mean.  Other characters than ASCII letters and those of numbers are examined
-_MAY_BE_OTHERWISE = np.array(
-    [
-        not (a.isascii() and (a.isalpha() or a in "0123456789+-."))
-        or (a + b).lower() in BEGIN_OF_STATISTICS
-        for a, b in _PAIRS
-    ]
-)
-_END, _QUOTE = ord("\n"), ord('"')
-# by the separator: a quoted cell, one with blanks before it, and a quote that begins a cell
-_QUOTED = {
-    sep: re.compile(rb'"(?<![^%b\n]")(?:[^"]++|"")*+"(?=[%b\n])' % (sep.encode(), sep.encode()))
-    for sep in ",;|\t"
-}
-_BEHIND_BLANKS = {
-    sep: re.compile(rb'(?<![^%b\n]) ++("(?:[^"]++|"")*+"(?=[%b\n]))' % (sep.encode(), sep.encode()))
-    for sep in ",;|\t"
-}
-_OPEN_QUOTE = {sep: re.compile(rb'(?<![^%b\n]) *+"' % sep.encode()) for sep in ",;|\t"}
-_UNCLOSED = re.compile(rb' *+"(?:[^"]++|"")*+\Z')
+_CLOSING = re.compile(r'(?:[^"]++|"")*+"')  # the rest of a quoted cell
+_UNCLOSED = re.compile(r' *+"(?:[^"]++|"")*+\Z')
 _EXCERPT = 500  # characters that are kept of a refused row
 _AT_ONCE = 2_000  # rows that are searched for the decimal separator at a time
 
@@ -92,167 +70,74 @@ class Most(NamedTuple):
 class Rows(NamedTuple):
     """Hold rows of a table in order, as text: each has as many cells as the header."""
 
-    data: bytes  #: UTF-8; each row ends with a line feed
-    ends: Places  #: positions of these line feeds
-    lines: Places  #: the line of the file in which each row begins
+    sep: str
+    texts: list[str]
+    lines: Sequence[int]  #: the line of the file in which each row begins
     #: by the index of a row: its text, and why it does not belong to this table; its cells are
     #: empty
     faults: dict[int, tuple[str, str]]
-    sep: str
-
-    @property
-    def has_quotes(self) -> bool:
-        """Return whether there is a quote."""
-        return b'"' in self.data
-
-    @property
-    def is_cut_by_lines(self) -> bool:
-        """Return whether each line feed ends a row."""
-        return not self.has_quotes or self.data.count(b"\n") == self.ends.size
 
     def cells(self) -> Iterator[list[str]]:
         """Yield the cells of each row."""
-        text = self.data.decode()
-        if not self.has_quotes:
-            yield from (line.split(self.sep) for line in text.split("\n")[:-1])
-            return
-        try:
-            yield from csv.reader(io.StringIO(text, newline="\n"), delimiter=self.sep)
-        except csv.Error as error:
-            raise TextError(f"line {self.lines[0]} or one of those behind it: {error}") from None
-
-    def of(self, i: int) -> list[str]:
-        """Return the cells of one row."""
-        start = self.ends[i - 1] + 1 if i else 0
-        text = self.data[start : self.ends[i]].decode()
-        return split_row(text, self.sep)
+        for line, text in zip(self.lines, self.texts, strict=True):
+            try:
+                yield split_row(text, self.sep)
+            except csv.Error as error:
+                raise TextError(f"line {line}: {error}") from None
 
 
-def rows_in(first: int, text: str, account: Account) -> tuple[Rows, str]:
-    """Return the rows in some lines (``first`` is the number of the first line), and the beginning
-    of a row that continues after them.
+class _OpenRow:
+    """Collect the lines of a row that has a line end in a quoted cell."""
 
-    Lines that are not rows of numbers are examined one by one.
-    """
-    sep = account.sep
-    if account.header.sep == BLANKS:
-        text = "\n".join(
-            sep.join(_BETWEEN_BLANKS.findall(line) if '"' in line else line.split())
-            for line in text.split("\n")
-        )
-    data, ends, seps, rest = _cut(first, f"{text}\n".encode(), sep)
-    starts = np.concatenate([[0], ends[:-1] + 1])[: ends.size]
-    lines = first + np.arange(ends.size)
-    if data.count(b"\n") != ends.size:
-        all_ends = np.flatnonzero(np.frombuffer(data, np.uint8) == _END)
-        lines = first + np.searchsorted(all_ends, starts)
-    lengths, keep = ends - starts, np.ones(ends.size, np.bool_)
-    parts, faults, end = list[bytes](), dict[int, tuple[str, str]](), 0
-    for i in _doubtful(account, data, starts, ends, seps):
-        line = data[starts[i] : ends[i]].decode()
-        row = account.row(int(lines[i]), line)
-        if row is None:
-            keep[i] = False
-        elif row[1] is not None:
-            faults[i] = line if len(line) <= _EXCERPT else line[:_EXCERPT] + "…", row[1]
-        if row is None or row[0] != line:
-            new = b"" if row is None else f"{row[0]}\n".encode()
-            parts += [data[end : starts[i]], new]
-            lengths[i], end = len(new) - 1, ends[i] + 1
-    if parts:
-        data, places = b"".join([*parts, data[end:]]), np.cumsum(keep) - 1
-        ends, lines = np.cumsum(lengths[keep] + 1) - 1, lines[keep]
-        faults = {int(places[i]): fault for i, fault in faults.items()}
-    return Rows(data, ends, lines, faults, sep), rest
+    def __init__(self, account: Account) -> None:
+        self._account = account
+        self.line = 0  #: the line in which the row begins
+        self._lines: list[str] = []
+        self._size = 0  # characters
 
+    def __bool__(self) -> bool:
+        return bool(self._lines)
 
-def _cut(first: int, data: bytes, sep: str) -> tuple[bytes, Places, Places, str]:
-    """Return complete rows, the positions of their ends and of the separators between their cells,
-    and the beginning of a row whose quote is not closed.  Raise TextError if a quote is not at the
-    end of its cell."""
-    rest, bare = "", data
-    quotes: Places = np.zeros(0, np.intp)
-    if b'"' in data:
-        quotes = np.flatnonzero(np.frombuffer(data, np.uint8) == _QUOTE)
-        if not _surround_cells(data, quotes, sep):
-            data, bare, rest = _without_quotes(first, data, sep)
-            quotes = quotes[:0]
-    signs = np.frombuffer(bare, np.uint8)
-    ends, seps = (np.flatnonzero(signs == ord(sign)) for sign in ("\n", sep))
-    if quotes.size:  # text after an odd number of quotes is within a cell
-        ends, seps = (places[np.searchsorted(quotes, places) % 2 == 0] for places in (ends, seps))
-    return data, ends, seps, rest
+    def whole(self, number: int, line: str) -> str | None:
+        """Return the row that ends with this line, or None if it goes on.  Raise TextError if a
+        quote is not at the end of its cell."""
+        sep, end = self._account.sep, 0
+        if self._lines:
+            closing = _CLOSING.match(line)
+            if closing is None:
+                self._add(line)
+                return None
+            end = closing.end()
+        elif '"' not in line or (is_comment(line) and not self._account.has_name(line)):
+            return line
+        else:
+            self.line = number
+        rest = line[end:]
+        rest = _BEHIND_BLANKS[sep].sub(r"\1", rest) if ' "' in rest else rest
+        bare = _QUOTED[sep].sub(lambda match: "0" * len(match[0]), rest)
+        open_quote = _OPEN_QUOTE[sep].search(bare)
+        if (end and rest and rest[0] != sep) or (
+            open_quote and not _UNCLOSED.match(rest, open_quote.start())
+        ):
+            raise unclosed(self.line)
+        if open_quote:
+            self._add(line[:end] + rest)
+            return None
+        row = "\n".join([*self._lines, line[:end] + rest])
+        self._lines, self._size = [], 0
+        return row
+
+    def _add(self, line: str) -> None:
+        """Add a line after which the row goes on."""
+        self._lines.append(line)
+        self._size += len(line)
+        if self._size > LONGEST:
+            raise unclosed(self.line)
 
 
-def _surround_cells(data: bytes, quotes: Places, sep: str) -> bool:
-    """Return whether each quote begins or ends a cell, or is one of two within it."""
-    if quotes.size % 2:
-        return False
-    signs = np.frombuffer(data, np.uint8)
-    is_beside = np.zeros(256, np.bool_)
-    is_beside[[ord(sep), _END, _QUOTE]] = True
-    before, behind = signs[quotes[::2] - 1], signs[quotes[1::2] + 1]
-    if quotes[0] == 0:
-        before[0] = _END
-    return bool(is_beside[before].all() and is_beside[behind].all())
-
-
-def _without_quotes(first: int, data: bytes, sep: str) -> tuple[bytes, bytes, str]:
-    """Return rows that may have quotes in other places: the rows, the rows with zeros instead of
-    quoted cells, and the beginning of a row whose quote is not closed."""
-    if b' "' in data:
-        data = _BEHIND_BLANKS[sep].sub(rb"\1", data)
-    bare = _QUOTED[sep].sub(lambda match: b"0" * len(match[0]), data)
-    for match in _OPEN_QUOTE[sep].finditer(bare) if b'"' in bare else ():
-        start = bare.rfind(b"\n", 0, match.start()) + 1
-        if is_comment(data[start : start + 100].decode(errors="ignore")):
-            continue
-        if _UNCLOSED.match(data, match.start()):
-            return data[:start], bare[:start], data[start:-1].decode()
-        raise _unclosed(first + data.count(b"\n", 0, start))
-    return data, bare, ""
-
-
-def _unclosed(line: int) -> TextError:
+def unclosed(line: int) -> TextError:
+    """Return the error for a row with a quote that does not end its cell."""
     return TextError(f"line {line}: a quote is not closed, or not at the end of its cell")
-
-
-def _doubtful(
-    account: Account, data: bytes, starts: Places, ends: Places, seps: Places
-) -> list[int]:
-    """Return the rows that must be examined one by one, because they do not begin like numbers, do
-    not have as many cells as the header, or may repeat the header."""
-    if not ends.size:
-        return []
-    signs = np.frombuffer(data, np.uint8)
-    until = np.searchsorted(seps, ends)  # number of separators before the end of each row
-    before = np.concatenate([[0], until[:-1]])
-    is_doubtful = until - before != account.width - 1
-    place = min(account.units.inputs, default=0)
-    first = starts
-    if place and seps.size:  # the first column is a name: test the first cell of an input, too
-        is_doubtful |= _MAY_BE_OTHERWISE[_begin_of(starts, signs)]
-        first = np.minimum(seps[np.minimum(before + place, seps.size) - 1] + 1, signs.size - 1)
-    is_doubtful |= ~_BEGINS_NUMBER[_begin_of(first, signs)]
-    # the row of units below a repeated header may begin like a number
-    is_doubtful[0] |= bool(account.repeated)
-    place = data.find(name := account.name.encode())
-    while place >= 0:
-        i = int(np.searchsorted(ends, place))
-        is_doubtful[i : i + 2] = True
-        place = data.find(name, int(ends[i])) if i < ends.size else -1
-    doubtful: list[int] = np.flatnonzero(is_doubtful).tolist()
-    return doubtful
-
-
-def _begin_of(cells: Places, signs: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    """Return the first two bytes of the cells that begin at some positions, after a quote."""
-    last = signs.size - 1
-    first = cells + (signs[cells] == _QUOTE)
-    second = np.minimum(first + 1, last)
-    pairs: NDArray[np.uint16] = 256 * signs[np.minimum(first, last)].astype(np.uint16)
-    pairs += signs[second]
-    return pairs
 
 
 # --- whole tables ---------------------------------------------------------------------------------
@@ -297,46 +182,57 @@ class TextTable:
         is_known = self._column_names.are_all_in(self.layout.heads)
         for last in (self.layout.first + _AT_ONCE, None):
             if is_known and not self.signs.decimal:
-                for rows in self._rows_of(self._start, last):
-                    self.see_signs(rows)
+                for piece in self._data_of(self._start, last):
+                    self.see_signs(self.rows_in(piece))
         self._start = []
 
-    def rows(self, report_place: Callable[[int], None] = lambda _place: None) -> Iterator[Rows]:
-        """Yield the rows in pieces, and tell ``report_place`` how far a file has been read."""
-        yield from self._rows_of(self._text(report_place), None)
-        if self._rest:
-            raise _unclosed(self._behind - self._rest.count("\n") - 1)
+    def pieces(self, report_place: Callable[[int], None] = lambda _place: None) -> Iterator[Piece]:
+        """Yield the lines from the first row on in pieces, and tell ``report_place`` how far a file
+        has been read."""
+        yield from self._data_of(self._text(report_place), None)
+        if self.open_row:
+            raise unclosed(self.open_row.line)
 
-    def _rows_of(self, pieces: Iterable[Piece], last: int | None) -> Iterator[Rows]:
-        """Yield the rows of pieces, up to the line ``last``."""
+    def _data_of(self, pieces: Iterable[Piece], last: int | None) -> Iterator[Piece]:
+        """Yield the lines of data, up to the line ``last``."""
         self.account = self.layout.account(self._column_names, self._dialect)
-        # the beginning of a row that continues after a piece, and the line after the piece
-        self._rest, self._behind = "", self.layout.first
+        #: a row that continues after the piece that was read last
+        self.open_row = _OpenRow(self.account)
         ends = [line for line in (last, self.layout.last) if line is not None]
         end = min(ends, default=None)
         for piece in pieces:
             self._check(piece)
             first, text = _between(piece, self.layout.first, end)
-            if text is None:
+            if text is not None:
+                yield Piece(first, text)
+
+    def rows_in(self, piece: Piece) -> Rows:
+        """Return the rows in some lines, each of which is accounted for."""
+        account, lines = self.account, list[int]()
+        rows = Rows(account.sep, [], lines, {})
+        for number, line in enumerate(piece.lines, piece.first):
+            if self.layout.sep == BLANKS:
+                cells = _BETWEEN_BLANKS.findall(line) if '"' in line else line.split()
+                line = account.sep.join(cells)
+            first = self.open_row.line if self.open_row else number
+            text = self.open_row.whole(number, line)
+            row = None if text is None else account.row(first, text)
+            if text is None or row is None:
                 continue
-            if self._rest:
-                first = self._behind - self._rest.count("\n") - 1
-                text = f"{self._rest}\n{text}"
-            self._behind = first + text.count("\n") + 1
-            rows, self._rest = rows_in(first, text, self.account)
-            if len(self._rest) > LONGEST:
-                return
-            yield rows
+            if row[1] is not None:
+                excerpt = text if len(text) <= _EXCERPT else f"{text[:_EXCERPT]}…"
+                rows.faults[len(rows.texts)] = excerpt, row[1]
+            rows.texts.append(row[0])
+            lines.append(first)
+        return rows
 
     def see_signs(self, rows: Rows) -> None:
         """Examine the numbers of some rows until they show their separators."""
-        if b"." not in rows.data and b"," not in rows.data:
-            return
-        numbered = zip(range(rows.ends.size), rows.lines.tolist(), rows.cells(), strict=True)
+        numbered = enumerate(zip(rows.lines, rows.cells(), strict=True))
         while not self.signs.decimal and (some := [*islice(numbered, _AT_ONCE)]):
             self.signs.see(
                 Cell(line, name, cells[i])
-                for j, line, cells in some
+                for j, (line, cells) in some
                 if j not in rows.faults
                 for i, name in self.layout.inputs.items()
             )
@@ -425,16 +321,15 @@ def read_numbers(
     if faults:
         raise TextError.of([f"line {layout.line}: {fault}" for fault in faults])
     lines, rows, wrong = list[int](), list[list[str]](), list[tuple[int, str]]()
-    for part in table.rows():
-        numbers = part.lines.tolist()
-        if len(lines) + len(numbers) > most.rows:
-            where = f"line {numbers[most.rows - len(lines)]}"
+    for part in map(table.rows_in, table.pieces()):
+        if len(lines) + len(part.lines) > most.rows:
+            where = f"line {part.lines[most.rows - len(lines)]}"
             raise TextError(f"{where}: there are more than {most.rows:,} rows: average them")
-        for i, cells in enumerate(part.cells()):
+        for i, (line, cells) in enumerate(zip(part.lines, part.cells(), strict=True)):
             if i in part.faults:
-                wrong.append((numbers[i], f"line {numbers[i]} {part.faults[i][1]}"))
+                wrong.append((line, f"line {line} {part.faults[i][1]}"))
             else:
-                lines.append(numbers[i])
+                lines.append(line)
                 rows.append(cells)
     if not rows and not wrong:
         raise TextError(f"line {layout.line}: no row follows the names of the columns")

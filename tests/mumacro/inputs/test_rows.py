@@ -48,6 +48,12 @@ def test_a_row_that_is_commented_out_is_no_row() -> None:
     assert table.skipped == [3]
 
 
+def test_a_quote_in_a_comment_does_not_take_rows_into_it() -> None:
+    table = table_of(f'v0,mu_macro\n{ONE}# a,"b\n{TWO}# "\n{THREE}')
+    assert table.columns["v0"].tolist() == [1.0, 2.0, 5.0]
+    assert table.skipped == [3, 5]
+
+
 def test_a_cell_beyond_the_head_is_not_dropped() -> None:
     assert table_of(f"v0,mu_macro\n1,0.069, ,\n{TWO}").columns["v0"].tolist() == [1.0, 2.0]
     with pytest.raises(TextError, match="line 3 has 3 cells, the header has 2"):

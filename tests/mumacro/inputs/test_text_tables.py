@@ -483,7 +483,7 @@ def test_a_formula_without_a_value_is_refused() -> None:
     ("data", "parts"),
     [
         (b'v0,mu_macro,note\n1,2,a\n1,2,"b"c\n', ("line 3", "quote")),
-        (b'v0,mu_macro,note\n1,2,a\n# a,"b\n1,2,c\n# "\n', ("line 3", "comment")),
+        (b'name,v0,mu_macro,note\n#1,1,2,"b\nc",1,2,3\n', ("line 2", "quote")),
         (b"", ("line 1", "is empty")),
         (b"\n \n\t\n", ("line 1", "is empty")),
         (b"v0,mu_macro\n", ("line 1", "no row")),
