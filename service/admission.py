@@ -31,7 +31,7 @@ from fastapi import Request
 from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from mumacro.stopping import Stop, StopError
+from mumacro.kernel.stopping import Stop, StopError
 
 from .problems import FULL, ProblemKind, RequestError, path_in
 from .security import HEALTH_PATHS

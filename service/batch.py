@@ -16,9 +16,9 @@ from mumacro.answer import Answer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, named, other_amplitude
 from mumacro.kernel.arrays import Codes
-from mumacro.notes import Note, add
 from mumacro.outputs.entry import Output
 from mumacro.outputs.evaluation import chosen, cost
+from mumacro.results import Note, add
 
 from .bodies import of_members
 from .forms import SLICE, Body, Reason, too_large, write_columns, write_rows

@@ -28,7 +28,7 @@ from mumacro.inputs.fields import (
     kind_of,
 )
 from mumacro.inputs.names import unknown_name
-from mumacro.stopping import look
+from mumacro.kernel.stopping import look
 
 from .json_text import NotRead, count, decode_batch, decode_columns, decode_rows, dump
 from .models.inputs import INPUTS, MAX_REASONS, entry

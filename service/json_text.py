@@ -23,7 +23,7 @@ from starlette.responses import Response
 
 from mumacro.inputs.fields import RIGID
 from mumacro.kernel.arrays import Array
-from mumacro.stopping import look
+from mumacro.kernel.stopping import look
 
 from .problems import FieldFault, ProblemKind, RequestError, refuse
 

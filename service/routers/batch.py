@@ -17,7 +17,7 @@ from fastapi import Query, Request, Response
 from starlette.types import Receive, Scope, Send
 
 from mumacro.inputs.cases import KIND
-from mumacro.stopping import look
+from mumacro.kernel.stopping import look
 
 from ..admission import AT_ONCE, LONG, ticket_in, ticket_of
 from ..batch import Batch

@@ -10,8 +10,7 @@ from mumacro import plotting
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.doubts import remarks as doubts
 from mumacro.inputs.fields import AMPLITUDE, Kind
-from mumacro.notes import Note
-from mumacro.results import Result, Rows, cell
+from mumacro.results import Note, Result, Rows, cell
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
 #: a float for one case, an array of float64 for many

@@ -18,9 +18,9 @@ from mumacro.inputs.carried import labelled_in_si, library
 from mumacro.inputs.cases import Cases, library_of
 from mumacro.inputs.columns import is_column, read_column
 from mumacro.inputs.fields import quantity_of
-from mumacro.notes import Note, add
 from mumacro.outputs import MEMBERS
 from mumacro.outputs.evaluation import chosen
+from mumacro.results import Note, add
 from mumacro.table.atlas import REGIMES, SOURCES
 
 #: libraries whose frames and tables give a result of the same type

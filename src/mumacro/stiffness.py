@@ -44,8 +44,7 @@ from typing import Any
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import real
-from mumacro.notes import WARNING, Note
-from mumacro.results import Result, Rows
+from mumacro.results import WARNING, Note, Result, Rows
 
 # limits of numbers in SI, so that every product of them below is a double
 SMALLEST, LARGEST = 1e-60, 1e60

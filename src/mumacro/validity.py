@@ -19,9 +19,9 @@ from mumacro.errors import InputError
 from mumacro.inputs.doubts import FURTHEST, UNITS
 from mumacro.inputs.fields import AMPLITUDE, RAD_PER_CYCLE, RIGID, SPRINGS_OF, Kind, kind_of
 from mumacro.inputs.numbers import plain
-from mumacro.notes import ASSUMES, Note, Row
 from mumacro.outputs.settling import REMAINING, decay_of_springs
 from mumacro.outputs.tabulated import Tabulated
+from mumacro.results import ASSUMES, Note, Row
 
 #: names of the rows, as in the table of docs/validity.md
 ROWS = (

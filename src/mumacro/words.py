@@ -6,9 +6,8 @@ from typing import Any
 from mumacro.answer import Answer
 from mumacro.inputs.fields import MEASURED_AS, PER_UNIT, Kind
 from mumacro.inputs.units import Unit, choose_unit, format_number, known, suit_unit, tidy_zeros
-from mumacro.notes import Note
 from mumacro.outputs import MEMBERS
-from mumacro.results import Rows
+from mumacro.results import Note, Rows
 from mumacro.validity import notes_of
 
 REGIMES = {

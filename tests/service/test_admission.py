@@ -18,7 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mumacro
-from mumacro.stopping import StopError, current
+from mumacro.kernel.stopping import StopError, current
 from service import admission as admissions
 from service import tables
 from service.admission import Admission, client_of

@@ -37,10 +37,9 @@ from mumacro.inputs.fields import (
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.numbers import check_signs
 from mumacro.inputs.units import belongs_to_value, choose_unit, format_number, tidy_zeros, unit_of
-from mumacro.notes import Note
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import names_in
-from mumacro.results import listed
+from mumacro.results import Note, listed
 from mumacro.surrogate import Surrogate
 
 ABOUT_INPUTS = f"""\

@@ -18,7 +18,7 @@ from mumacro.cli.common import (
 )
 from mumacro.cli.table_format import add_format, dialect_in
 from mumacro.files.run import evaluate_files
-from mumacro.notes import Remark
+from mumacro.results import Remark
 
 _COLUMNS = """\
 columns, by name in any order; another unit in brackets, as in k [N/mm] or y0 [um]:

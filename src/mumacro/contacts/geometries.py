@@ -12,7 +12,7 @@ from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import real
 from mumacro.inputs.doubts import UNITS
 from mumacro.inputs.names import unknown_name
-from mumacro.notes import REMARK, Note
+from mumacro.results import REMARK, Note
 from mumacro.stiffness import (
     AXES,
     Contact,

@@ -34,9 +34,9 @@ from mumacro.inputs.names import absent, find_heads, meant_by
 from mumacro.inputs.numbers import Signs
 from mumacro.inputs.units import Scale, in_si, scale_of, split_unit, too_large_in_si
 from mumacro.kernel.arrays import Array, Bools, Codes
-from mumacro.notes import Note
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import chosen, names_in, paths_of
+from mumacro.results import Note
 from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 

@@ -25,7 +25,7 @@ from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import KIND
 from mumacro.inputs.fields import Kind, kind_of
 from mumacro.inputs.layout import Dialect
-from mumacro.notes import Note, Remark, add
+from mumacro.results import Note, Remark, add
 from mumacro.surrogate import Surrogate
 from mumacro.table.atomic import growing, to_disk
 

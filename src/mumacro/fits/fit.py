@@ -20,7 +20,7 @@ from mumacro.fits.fitted import Fit
 from mumacro.fits.measured_points import STD, Measured
 from mumacro.fits.profile import Profile, quantile
 from mumacro.kernel.arrays import Array
-from mumacro.notes import WARNING, Note
+from mumacro.results import WARNING, Note
 from mumacro.surrogate import Surrogate
 from mumacro.validity import HARDLY
 

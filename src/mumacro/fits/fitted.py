@@ -12,8 +12,7 @@ from mumacro.fits.measured_points import STD, UNKNOWNS, Measured
 from mumacro.fits.profile import quantile
 from mumacro.inputs.fields import RIGID
 from mumacro.kernel.arrays import Array, Bools
-from mumacro.notes import Note
-from mumacro.results import Result, Rows
+from mumacro.results import Note, Result, Rows
 
 _CURVE = 200  # points of the fitted law
 

@@ -7,8 +7,7 @@ from typing import Any
 from mumacro import plotting
 from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
-from mumacro.notes import NOTE, Note, texts_of
-from mumacro.results import Result, Rows
+from mumacro.results import NOTE, Note, Result, Rows, texts_of
 
 _UNITS = {"offset": "N", "drift": "N/sample"}
 

@@ -18,7 +18,7 @@ from mumacro.inputs.names import unknown_name
 from mumacro.inputs.text_tables import Most, TableOfNumbers, read_numbers
 from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Bools
-from mumacro.notes import REMARK, Note
+from mumacro.results import REMARK, Note
 from mumacro.surrogate import Surrogate
 
 UNKNOWNS = ("k", "mu0")

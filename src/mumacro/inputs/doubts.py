@@ -16,7 +16,7 @@ from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE, quantity_of
 from mumacro.inputs.numbers import plain
 from mumacro.inputs.units import Unit, parse_unit
 from mumacro.kernel.arrays import Array, Bools
-from mumacro.notes import REMARK, Note
+from mumacro.results import REMARK, Note
 
 UNITS, STIFFNESS = "units", "k is known"  # rows of docs/validity.md
 MODEL = "model"  # the row of a case that needs no model

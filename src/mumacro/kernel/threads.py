@@ -14,7 +14,7 @@ import numpy as np
 
 from mumacro.kernel.arrays import Array, Codes
 from mumacro.kernel.binding import CaseRows, Data, Detail, ExtremeRows, SlopeRows, kernels
-from mumacro.stopping import current
+from mumacro.kernel.stopping import current
 
 SLICE = 16_384  # points in a slice, so that its arrays stay in the second-level cache
 ONE_THREAD = 65_536  # points that one thread evaluates while a second thread starts

@@ -13,8 +13,7 @@ from mumacro.inputs.columns import to_si
 from mumacro.inputs.fields import Numbers
 from mumacro.kernel.arrays import Array
 from mumacro.motions.oscillation import MOST_HARMONIC
-from mumacro.notes import NOTE, Note, texts_of
-from mumacro.results import Result
+from mumacro.results import NOTE, Note, Result, texts_of
 
 # Relative to the largest sample: the rounding error of a term, and of the difference between equal
 # samples.

@@ -21,11 +21,10 @@ from mumacro.inputs.doubts import remarks_on_motion
 from mumacro.inputs.fields import BOUNDS, RAD_PER_CYCLE, STIFFNESS, Numbers, Oscillation, kind_of
 from mumacro.kernel.arrays import Array, Bools, common_shape, flat
 from mumacro.kernel.binding import kernels
+from mumacro.kernel.stopping import current, look
 from mumacro.kernel.threads import default_threads
 from mumacro.motions.oscillation import read_oscillation
-from mumacro.notes import WARNING, Note
-from mumacro.results import Result, Rows, cell
-from mumacro.stopping import current, look
+from mumacro.results import WARNING, Note, Result, Rows, cell
 
 TOLERANCES = 1e-9, 1e-2
 # the largest and the smallest displacement in a radian, in units of mu0 Fz / k; below the smallest

@@ -8,9 +8,9 @@ import numpy as np
 
 from mumacro.inputs.cases import ALL_FIELDS
 from mumacro.inputs.fields import POSITIVE
-from mumacro.notes import REMARK, Note
 from mumacro.outputs.entry import Member, Output, Values
 from mumacro.outputs.evaluated import Evaluated, where
+from mumacro.results import REMARK, Note
 
 #: limit, as a fraction of the whole deviation, of the difference between mu_macro one deviation up
 #: or down and the straight line

@@ -29,11 +29,10 @@ from mumacro.inputs.fields import (
 )
 from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
-from mumacro.notes import Note
 from mumacro.outputs.evaluation import chosen
 from mumacro.questions.borders import Crossing, border_crossings
 from mumacro.questions.input_curve import InputCurve
-from mumacro.results import Result
+from mumacro.results import Note, Result
 from mumacro.surrogate import Surrogate
 from mumacro.validity import digits, effect_of, load_notes
 

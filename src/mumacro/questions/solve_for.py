@@ -45,11 +45,11 @@ from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import fixed_inputs, real, without_interval
 from mumacro.inputs.fields import AMPLITUDE, ENDS, POSITIVE, QUANTITY_OF, Numbers, field_of, kind_of
 from mumacro.kernel.arrays import Array
-from mumacro.notes import Note
 from mumacro.questions.input_curve import EVERYWHERE, InputCurve
 from mumacro.questions.law import law
 from mumacro.questions.search import TINY, Search, samples
 from mumacro.questions.solutions import Reach, Solution
+from mumacro.results import Note
 from mumacro.surrogate import Surrogate
 from mumacro.validity import digits, effect_of_groups, load_notes
 

@@ -14,8 +14,8 @@ from mumacro import Element, InputError, Motion, Surrogate, motion, solve_motion
 from mumacro.cli.main import main
 from mumacro.cli.motion import EXAMPLE
 from mumacro.kernel.binding import Kernel
+from mumacro.kernel.stopping import Stop, StopError
 from mumacro.motions.motion import SLOWEST
-from mumacro.stopping import Stop, StopError
 from tests.support.cases import Array, Capture
 from tests.support.comparing import close
 from tests.support.refusals import refused

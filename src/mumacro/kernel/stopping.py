@@ -7,7 +7,7 @@ checks it at every step of a motion.
 ...     stop.set()
 ...     look()
 Traceback (most recent call last):
-mumacro.stopping.StopError: the computation was ended
+mumacro.kernel.stopping.StopError: the computation was ended
 """
 
 from collections.abc import Iterator
