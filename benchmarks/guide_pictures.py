@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import mumacro
-from mumacro.plotting import BLUE, OF_FIT, RED, Panels, head, save
+from mumacro.plotting import BLUE, OF_FIT, RED, head, save
 from mumacro.stiffness import Material, ball_on_flat
 from tests.support.measuring import IMAGES
 
@@ -51,12 +51,12 @@ def small_and_large(path: Path) -> None:
             head(axes, f"$y_0$ = {amplitude:g} $l_0$, {size} $l_0$")
         every[0].set_ylabel(r"force / ($\mu_0 F_z$)")
 
-    save(path, draw, Panels(columns=2, size=(9.0, 3.4)), dpi=100)
+    save(path, draw, dpi=100, ncols=2, figsize=(9.0, 3.4))
 
 
 def fit(path: Path) -> None:
     """Draw the fit of the guide on fits."""
-    save(path, mumacro.fit(POINTS, Fz=10.0, y0=0.4e-6, f=20e3).plot, OF_FIT, dpi=100)
+    save(path, mumacro.fit(POINTS, Fz=10.0, y0=0.4e-6, f=20e3).plot, dpi=100, **OF_FIT)
 
 
 PICTURES: dict[str, Callable[[Path], None]] = {

@@ -37,7 +37,7 @@ from builder.solver.stick import stick_excess
 from builder.solver.sweep import Sweep
 from mumacro import Surrogate, closed_forms
 from mumacro.inputs.fields import BALL, SPRING, Kind
-from mumacro.plotting import Panels, save
+from mumacro.plotting import save
 from mumacro.table import atlas
 from mumacro.table.polynomials import chebyshev_coefficients, interpolation_matrix, nodes
 
@@ -469,7 +469,7 @@ def gallery() -> str:
         values = shown.values(shown.v, shown.y)
         truth, ours, bound, spline = values
         draw = partial(_draw, shown, values)
-        save(IMAGES / f"hard-{name}.png", draw, Panels(columns=2, size=(9.0, 3.2)), dpi=100)
+        save(IMAGES / f"hard-{name}.png", draw, dpi=100, ncols=2, figsize=(9.0, 3.2))
         errors = [np.abs(x - truth).max() for x in (ours, spline)]
         numbers = (errors[0], bound.max(), errors[1])
         covered = f"{100.0 * np.mean(np.abs(ours - truth) <= bound + 4e-15 * np.abs(truth)):.0f}"

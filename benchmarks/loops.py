@@ -117,7 +117,7 @@ def draw() -> None:
     """docs/img/loop.png: a noisy loop of a ball."""
     x = 6e-6 * np.sin(np.linspace(0.0, 6.0 * math.pi, 600))
     force = forces("ball", x, 1e6) + np.random.default_rng(1).normal(size=x.size) * 0.08
-    save(IMAGES / "loop.png", mumacro.fit_loop(x, force, FZ, "ball").plot, OF_FIT, dpi=100)
+    save(IMAGES / "loop.png", mumacro.fit_loop(x, force, FZ, "ball").plot, dpi=100, **OF_FIT)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import Fit, Surrogate, fit, solve_for
-from mumacro.plotting import BLUE, GREY, INK, RED, Panels, head, save
+from mumacro.plotting import BLUE, GREY, INK, RED, head, save
 
 Array = NDArray[np.float64]
 DATA = ROOT / "tests" / "data"
@@ -125,7 +125,7 @@ def forces() -> str:
         "rigid [N]",
         "shaken/rigid",
     )
-    save(IMAGES / "measured.png", _draw, Panels(columns=3, size=(12.0, 4.2)), dpi=100)
+    save(IMAGES / "measured.png", _draw, dpi=100, ncols=3, figsize=(12.0, 4.2))
     return markdown(header, rows, 0)
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import Surrogate, motion
-from mumacro.plotting import BLUE, GREY, INK, OF_CYCLE, RED, Panels, head, save
+from mumacro.plotting import BLUE, GREY, INK, OF_CYCLE, RED, head, save
 
 Array = NDArray[np.float64]
 CASE: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1e5}
@@ -285,12 +285,12 @@ def pictures(share: float = 1.0) -> str:  # noqa: ARG001 - every section gets it
     """Writes the pictures of docs/how-to/motion.md, and prints the phase sweep at its ends."""
     case: dict[str, Any] = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "f": 20e3, "v0": 0.02}
     cycle = motion(**case, x=(2e-6, 90), y=4e-6)
-    save(IMAGES / "motion-ellipse.png", cycle.plot, OF_CYCLE, dpi=110)
+    save(IMAGES / "motion-ellipse.png", cycle.plot, dpi=110, **OF_CYCLE)
     rows: list[list[str]] = []
     save(
         IMAGES / "motion-phase.png",
         lambda axes: rows.extend(_draw_phases(axes)),
-        Panels(size=(6.4, 4.2)),
+        figsize=(6.4, 4.2),
         dpi=110,
     )
     header = ("v0 [m/s]", "least mu_macro/mu0", "at [degrees]", "most", "at [degrees]")

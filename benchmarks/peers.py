@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
 
-from mumacro.plotting import Panels, save
+from mumacro.plotting import save
 
 Array = NDArray[np.float64]
 Evaluate = Callable[[Array, Array], Array]
@@ -96,7 +96,7 @@ def plot(lines: list[Line], path: Path) -> None:
         axes.set_ylim(bottom=7.0)
         axes.legend(fontsize=9, loc="upper left")
 
-    save(path, drawn, Panels(size=(9.5, 5.0)), dpi=100)
+    save(path, drawn, dpi=100, figsize=(9.5, 5.0))
 
 
 def logarithmic(axes: Any) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 
 import mumacro
 from mumacro.motions.solve_motion import UNKNOWNS, MotionCurve
-from mumacro.plotting import INK, Panels, head, save
+from mumacro.plotting import INK, head, save
 
 PROBLEMS, FINE = 1000, 2000
 POSSIBLE = [name for name in UNKNOWNS if name != "omega"]
@@ -135,7 +135,7 @@ def picture(share: float = 1.0) -> str:  # noqa: ARG001 - every section gets it
         axes.set_ylim(bottom=0.0)
         head(axes, r"$\mu_0$ = 0.3, $F_z$ = 10 ± 8 N, $k$ = 0.1 N/µm, $x_0$ = 0.1 mm, $f$ = 50 Hz")
 
-    save(IMAGES / "conveyor.png", draw, Panels(size=(6.4, 4.2)), dpi=110)
+    save(IMAGES / "conveyor.png", draw, dpi=110, figsize=(6.4, 4.2))
     return f"fastest: {1e3 * speeds[best]:.2f} mm/s at {PHASES[best]:g} degrees"
 
 

@@ -62,7 +62,7 @@ from builder.tables.contacts import spring
 from builder.tables.draws import SEAMS, fast_from, log_uniform
 from builder.tables.rounding import round_block
 from mumacro import Surrogate, closed_forms
-from mumacro.plotting import Panels, save
+from mumacro.plotting import save
 from mumacro.table import atlas
 from mumacro.table.atlas import QUANTITY_NAMES
 from mumacro.table.blocks import Table, TabulatedContact
@@ -216,12 +216,9 @@ def speed(points: int, rounds: int, quick: bool) -> str:
         rows.append([c.name, c.size, *sizes, *map(quantity, (ns, largest, most))])
     rows.append(["one solve of the full model", "compiled", "-", "-", quantity(direct), "-", "-"])
     if not quick:
-        panels = Panels(size=(8.0, 5.4))
-        save(
-            IMAGES / "speed_against_error.png", partial(_over_time, found, direct), panels, dpi=110
-        )
-        panels = Panels(columns=2, size=(10.0, 5.0))
-        save(IMAGES / "error_over_size.png", partial(_over_size, found), panels, dpi=100)
+        over_time, over_size = partial(_over_time, found, direct), partial(_over_size, found)
+        save(IMAGES / "speed_against_error.png", over_time, dpi=110, figsize=(8.0, 5.4))
+        save(IMAGES / "error_over_size.png", over_size, dpi=100, ncols=2, figsize=(10.0, 5.0))
     v_true = truth(quick)[0]
     text = (
         f"Times are of {_points(points, quick):,} random points, one thread, processor time, best "
@@ -425,8 +422,9 @@ def error_map(points: int, rounds: int, quick: bool) -> str:  # noqa: ARG001
         save(
             IMAGES / "error_map.png",
             partial(_map, s, v, y, error, bound),
-            Panels(columns=2, size=(10.0, 4.6)),
             dpi=100,
+            ncols=2,
+            figsize=(10.0, 4.6),
         )
     rows = []
     for code in np.unique(source):
@@ -474,8 +472,8 @@ def convergence(points: int, rounds: int, quick: bool) -> str:  # noqa: ARG001
                 texts = f"{n * n:,}", f"{8 * n * n:,}", *map(quantity, (seconds, largest, most))
                 rows.append([f"{LOOKS[c.name][0]}, {n} x {n}", *texts])
     if not quick:
-        panels = Panels(columns=3, size=(12.0, 4.6))
-        save(IMAGES / "convergence.png", partial(_convergence, lines), panels, dpi=100)
+        picture = partial(_convergence, lines)
+        save(IMAGES / "convergence.png", picture, dpi=100, ncols=3, figsize=(12.0, 4.6))
     header = ("built for", "solves", "bytes", "seconds", "max abs error", "99 % abs error")
     return (
         "Border and blocks of one spring across, with friction, power and stick fraction; without "

@@ -8,13 +8,13 @@ import sys
 from pathlib import Path
 
 from mumacro import Surrogate
-from mumacro.plotting import Panels, save
+from mumacro.plotting import save
 from tests.support.measuring import IMAGES
 
 
 def draw(surrogate: Surrogate, out: Path) -> None:
     """Write the picture, 900 x 600 pixels."""
-    save(out, surrogate.plot, Panels(size=(9.0, 6.0)), dpi=100)
+    save(out, surrogate.plot, dpi=100, figsize=(9.0, 6.0))
 
 
 if __name__ == "__main__":

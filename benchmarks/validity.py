@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mumacro import Surrogate
-from mumacro.plotting import INK, Panels, save
+from mumacro.plotting import INK, save
 from mumacro.stiffness import Material, ball_on_flat, flat_punch
 
 STEEL = Material(E=210e9, nu=0.3)
@@ -88,7 +88,7 @@ def rigs() -> str:
             axes.plot(*zip(*places, strict=True), shape, color=INK, mec="white", ms=9, label=name)
         axes.figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=9)
 
-    save(IMAGES / "contacts.png", draw, Panels(size=(9.0, 6.0)), dpi=100)
+    save(IMAGES / "contacts.png", draw, dpi=100, figsize=(9.0, 6.0))
     header = (
         "contact",
         "k [N/m]",

@@ -124,7 +124,7 @@ def names(built: bool) -> dict[str, Any]:
         "impossible": {" ".join(kind): reason for kind, reason in reasons.items() if reason},
         "outputs": {" ".join(kind): _outputs_of(kind) for kind in kinds if not reasons[kind]},
         "lacks": {" ".join(kind): _lacks(kind) for kind in kinds if not reasons[kind]},
-        "regimes": {name: plotting.regime_words(name) for name in REGIMES},
+        "regimes": {name: plotting.REGIMES[name].words for name in REGIMES},
         "geometries": geometries,
         "arguments": arguments,
         "materials": _MATERIALS,
@@ -176,7 +176,7 @@ def map_of(
         "levels": plotting.LEVELS,
         "colours": plotting.band_colours(),
         "labels": plotting.label_places(ratio, on_map),
-        "areas": [[*place, plotting.regime_words(name)] for place, name in regimes],
+        "areas": [[*place, plotting.REGIMES[name].words] for place, name in regimes],
     }
 
 

@@ -81,25 +81,15 @@ _ARROWS = 16  # number of arrows of the force along a path
 AREAS = ((0.14, 0.735), (0.8, 0.12))
 
 
-class Panels(NamedTuple):
-    """Describe how many axes a picture has, and its size [inches]; the default is the size of the
-    user's style."""
-
-    rows: int = 1
-    columns: int = 1
-    size: tuple[float, float] | None = None
-    heights: tuple[float, ...] | None = None  #: heights of the rows, which share their x
-
-    def on(self, figure: Any) -> Any:
-        """Return the axes of a figure, as an array if there are several."""
-        return figure.subplots(
-            self.rows, self.columns, sharex=self.heights is not None, height_ratios=self.heights
-        )
-
-
-#: forces and path; curves and residuals
-OF_CYCLE = Panels(columns=2, size=(10.0, 5.0))
-OF_FIT = Panels(rows=2, size=(6.4, 5.6), heights=(3.0, 1.0))
+#: the panels of a picture, as ``subplots`` of matplotlib takes them: forces and path; curves and
+#: residuals
+OF_CYCLE: dict[str, Any] = {"ncols": 2, "figsize": (10.0, 5.0)}
+OF_FIT: dict[str, Any] = {
+    "nrows": 2,
+    "figsize": (6.4, 5.6),
+    "sharex": True,
+    "height_ratios": (3.0, 1.0),
+}
 
 
 class MeasuredCurve(NamedTuple):
@@ -134,12 +124,18 @@ def _loaded(name: str) -> Any:
         raise MumacroError(missing("plot", error)) from None
 
 
-def axes_for(ax: Any, panels: Panels = Panels()) -> Any:  # noqa: B008 - it cannot change
-    """Return the matplotlib axes of the caller, or new ones."""
+def axes_for(ax: Any, **panels: Any) -> Any:
+    """Return the matplotlib axes of the caller, or new ones; ``panels`` as :data:`OF_FIT`."""
     if ax is not None:
         return ax
-    pyplot = _loaded("pyplot")
-    return panels.on(pyplot.figure(figsize=panels.size, layout="constrained"))
+    _, axes = _loaded("pyplot").subplots(layout="constrained", **panels)
+    return axes
+
+
+def _two_panels(ax: Any, panels: Mapping[str, Any]) -> tuple[Any, Any]:
+    """Return two axes of the caller, or new ones.  The second is None if the caller has one."""
+    axes = axes_for(ax, **panels)
+    return tuple(axes) if np.ndim(axes) else (axes, None)
 
 
 def style() -> AbstractContextManager[None]:
@@ -159,12 +155,7 @@ def style() -> AbstractContextManager[None]:
     return context
 
 
-def save(
-    path: str | Path,
-    draw: Callable[[Any], Any],
-    panels: Panels = Panels(),  # noqa: B008 - it cannot change
-    dpi: int = 150,
-) -> None:
+def save(path: str | Path, draw: Callable[[Any], Any], dpi: int = 150, **panels: Any) -> None:
     """Write a picture in the style of this project; ``draw`` gets its axes (several panels: an
     array of them).  Raise InputError if the name does not end in one of ``ENDINGS``."""
     path = Path(path)
@@ -174,8 +165,9 @@ def save(
     # the same picture has the same bytes
     metadata = {".svg": {"Date": None}, ".png": {"Software": None}}.get(path.suffix)
     with style():
-        figure = _loaded("figure").Figure(figsize=panels.size or (7.0, 4.8), layout="constrained")
-        draw(panels.on(figure))
+        size = panels.pop("figsize", (7.0, 4.8))
+        figure = _loaded("figure").Figure(figsize=size, layout="constrained")
+        draw(figure.subplots(**panels))
         figure.savefig(path, dpi=dpi, metadata=metadata)
 
 
@@ -230,13 +222,8 @@ def oscillation_words(symbol: str, unit: str, terms: Iterable[tuple[int, float, 
     return f"{symbol}: {', '.join(parts)}" if parts else ""
 
 
-def regime_words(name: str) -> str:
-    """Return the name of a regime in a picture."""
-    return REGIMES[name].words
-
-
 def _axis(name: str) -> str:
-    return f"{_SYMBOLS[name]} [{unit_of(name)}]"
+    return f"{_SYMBOLS.get(name, name)} [{unit_of(name)}]"
 
 
 def _points(text: str, size: Any) -> float:
@@ -302,29 +289,33 @@ def head(ax: Any, title: str, legend: bool = True, last: Any = None) -> None:
 def plot_law(
     along: str,
     x: Array,
-    mu_macro: Array,
-    mu_static: Array,
+    mean: Array,
     ax: Any = None,
     *,
+    of: str = "mu_macro",
+    static: Array | None = None,
     band: tuple[Array, Array] | None = None,
     band_of: str = "k",
     borders: Iterable[tuple[float, str]] = (),
     roots_of: Mapping[float, Iterable[float]] = MappingProxyType({}),
     title: str = "",
 ) -> Any:
-    """Draw mu_macro (n,) over values ``x`` (n,) of the input ``along``, with its static limit (n,).
+    """Draw a mean friction ``of`` a contact (n,) over values ``x`` (n,) of the input ``along``,
+    with its ``static`` limit (n,).
 
     ``band`` are the smallest and the largest mu_macro over an interval of k, (n,) each, or with
     ``band_of`` "std" one standard deviation below and above.  ``borders`` are places on ``x`` with
     their names, such as "border of continuous sliding". ``roots_of`` are values of the input to
-    mark, by the mu_macro [-] that they give.  ``title`` names the other inputs.
+    mark, by the mean [-] that they give.  ``title`` names the other inputs.
     """
     ax, ink = axes_for(ax), _ink()
-    ax.plot(x, mu_macro, color="C0", label=r"$\mu_\mathrm{macro}$")
+    symbol = rf"$\mu_\mathrm{{{of.removeprefix('mu_')}}}$"
+    ax.plot(x, mean, color="C0", label=symbol)
     if band:
         words = {"k": "for every $k$ of the interval", "std": "one standard deviation"}[band_of]
         ax.fill_between(x, *band, color="C0", alpha=0.2, lw=0.0, label=words)
-    ax.plot(x, mu_static, ":", color=ink, alpha=0.7, label=r"static limit, $v_0 \to 0$")
+    if static is not None:
+        ax.plot(x, static, ":", color=ink, alpha=0.7, label=r"static limit, $v_0 \to 0$")
     legend_names = set[str]()
     for value, name in borders:
         label = None if name in legend_names else name
@@ -336,36 +327,9 @@ def plot_law(
         ax.plot(places, [target] * len(places), "o", color=ink, mec="white")
     if x[0] > 0.0 and x[-1] > 20.0 * x[0]:
         ax.set_xscale("log")
-    ax.set(xlabel=_axis(along), ylabel=r"$\mu_\mathrm{macro}$ [-]", xlim=(x[0], x[-1]))
-    ax.set_ylim(bottom=0.0)
-    head(ax, title)
-    return ax
-
-
-def plot_roots(
-    name: str,
-    x: Array,
-    mean: Array,
-    of: str,
-    targets: Sequence[float],
-    roots: Sequence[float],
-    log: bool,
-    ax: Any = None,
-    title: str = "",
-) -> Any:
-    """Draw a mean force ``of`` a motion (n,) over values ``x`` (n,) of an input, whose axis is
-    ``name``, with targets and roots."""
-    ax, ink = axes_for(ax), _ink()
-    symbol = {"mu_macro": r"\mathrm{macro}", "mu_lateral": r"\mathrm{lateral}"}[of]
-    ax.plot(x, mean, color="C0", label=rf"$\mu_{symbol}$")
-    for i, target in enumerate(targets):
-        ax.axhline(target, lw=0.8, color=ink, alpha=0.7, label=None if i else "target")
-    for i, root in enumerate(roots):
-        label = None if i else "root"
-        ax.plot(root, np.interp(root, x, mean), "o", color=ink, mec="white", label=label)
-    if log:
-        ax.set_xscale("log")
-    ax.set(xlabel=name, ylabel=rf"$\mu_{symbol}$ [-]", xlim=(x[0], x[-1]))
+    ax.set(xlabel=_axis(along), ylabel=f"{symbol} [-]", xlim=(x[0], x[-1]))
+    if static is not None:
+        ax.set_ylim(bottom=0.0)
     head(ax, title)
     return ax
 
@@ -377,8 +341,7 @@ def plot_fit(along: str, curves: Sequence[MeasuredCurve], title: str, ax: Any = 
     ``ax`` is a pair of axes, or one (then no residuals are drawn), or None for new ones.  The upper
     axes are returned.
     """
-    pair = axes_for(ax, OF_FIT)
-    upper, lower = pair if np.ndim(pair) else (pair, None)
+    upper, lower = _two_panels(ax, OF_FIT)
     paper = _loaded("").rcParams["axes.facecolor"]
     for i, (one, mark) in enumerate(zip(curves, _MARKS * len(curves), strict=False)):
         points, band = (None, None) if i else ("measured", "95 % band of the fit")
@@ -413,21 +376,24 @@ def plot_fit(along: str, curves: Sequence[MeasuredCurve], title: str, ax: Any = 
 def plot_loop(x: Array, force: Array, fitted: Array, title: str, ax: Any = None) -> Any:
     """Draw a measured loop, force [N] over displacement [m], and the loop of the model, and below
     them the residuals; ``ax`` as for :func:`plot_fit`."""
-    pair = axes_for(ax, OF_FIT)
-    upper, lower = pair if np.ndim(pair) else (pair, None)
-    scale, unit = 1e6, "µm"
-    if np.ptp(x) > 2e-3:
-        scale, unit = 1e3, "mm"
-    upper.plot(scale * x, force, ".", color="C0", ms=4.0, label="measured")
-    upper.plot(scale * x, fitted, color="C1", lw=1.5, label="model")
+    upper, lower = _two_panels(ax, OF_FIT)
+    unit, x = _in_one_unit(x)
+    upper.plot(x, force, ".", color="C0", ms=4.0, label="measured")
+    upper.plot(x, fitted, color="C1", lw=1.5, label="model")
     upper.set(ylabel=r"$F_t$ [N]")
     (upper if lower is None else lower).set_xlabel(f"displacement [{unit}]")
     if lower is not None:
-        lower.plot(scale * x, force - fitted, ".", color="C0", ms=4.0)
+        lower.plot(x, force - fitted, ".", color="C0", ms=4.0)
         lower.axhline(0.0, lw=0.8, color=_ink())
         lower.set_ylabel("residual [N]")
     head(upper, title)
     return upper
+
+
+def _in_one_unit(*lengths: Array) -> tuple[Any, ...]:
+    """Return the unit that suits the largest range of lengths [m], and the lengths in it."""
+    unit, scale = suit_unit("m", float(max(map(np.ptp, lengths))))
+    return unit.replace("um", "µm"), *(x * scale.over / scale.times for x in lengths)
 
 
 def _ink() -> str:
@@ -573,7 +539,7 @@ def plot_map(
         text.set_path_effects(halo)
     for (u, w), name in zip(AREAS, areas, strict=False):
         ax.annotate(
-            regime_words(name),
+            REGIMES[name].words,
             (u, w),
             xycoords="axes fraction",
             ha="center",
@@ -672,25 +638,6 @@ def _mark(ax: Any, marks: Marks, normal: bool, halo: Any) -> None:
         )
 
 
-# --- an oscillation -------------------------------------------------------------------------------
-
-
-def plot_harmonics(orders: Array, amplitudes: Array, rms: float, title: str, ax: Any = None) -> Any:
-    """Draw amplitudes (n,) over their harmonics (n,), and the root mean square of the rest, in the
-    unit of the samples."""
-    ax = axes_for(ax)
-    top = max(float(amplitudes.max(initial=0.0)), rms)
-    ax.vlines(orders, 0.0, amplitudes, color="C0")
-    ax.plot(orders, amplitudes, "o", color="C0", label="amplitude")
-    ax.axhline(rms, color=_ink(), ls=":", alpha=0.7, label="rms of what is left out")
-    last = int(orders.max(initial=1))
-    ax.set(xlim=(0.0, last + 1.0), ylim=(0.0, 1.1 * top if top > 0.0 else 1.0))
-    ax.xaxis.set_major_locator(_loaded("ticker").MaxNLocator(integer=True))
-    ax.set(xlabel="harmonic", ylabel="amplitude, in the unit of the samples")
-    head(ax, title)
-    return ax
-
-
 # --- a steady cycle -------------------------------------------------------------------------------
 
 
@@ -701,25 +648,22 @@ def plot_cycle(
     Fx: Array,
     Fy: Array,
     Fz: Array,
-    mu0: float | None = None,
+    mu0: float,
     title: str = "",
     ax: Any = None,
 ) -> Any:
-    """Draw the forces of one period over time, with the limit mu0 Fz if mu0 is known, and the path
-    of the upper point with the force at 16 moments; all (n,), in SI.
+    """Draw the forces of one period over time, with the limit mu0 Fz, and the path of the upper
+    point with the force at 16 moments; all (n,), in SI.
 
     ``ax`` is a pair of axes, or one (then no path is drawn), or None for new ones.  The axes of the
     forces are returned.
     """
-    pair = axes_for(ax, OF_CYCLE)
-    forces, path = pair if np.ndim(pair) else (pair, None)
-    ink = _ink()
+    (forces, path), ink = _two_panels(ax, OF_CYCLE), _ink()
     share = (t - t[0]) / (t[-1] - t[0])
     forces.plot(share, Fx, color="C0", label="$F_x$, along the drag")
     forces.plot(share, Fy, color="C1", label="$F_y$, across")
-    if mu0 is not None:
-        forces.plot(share, mu0 * Fz, ":", color=ink, alpha=0.7, label=r"$\pm\mu_0 F_z$")
-        forces.plot(share, -mu0 * Fz, ":", color=ink, alpha=0.7)
+    forces.plot(share, mu0 * Fz, ":", color=ink, alpha=0.7, label=r"$\pm\mu_0 F_z$")
+    forces.plot(share, -mu0 * Fz, ":", color=ink, alpha=0.7)
     mean = float(np.sum((Fx[1:] + Fx[:-1]) * np.diff(share)) / 2.0)
     forces.axhline(mean, lw=0.8, color="C0", ls="--", label="mean of $F_x$")
     forces.set(xlabel="share of the period [-]", ylabel="force [N]", xlim=(0.0, 1.0))
@@ -731,9 +675,7 @@ def plot_cycle(
 
 def _draw_path(path: Any, x: Array, y: Array, Fx: Array, Fy: Array) -> None:
     """Draw the path of the upper point on its axes, with the force at 16 moments."""
-    extent = max(np.ptp(x), np.ptp(y))
-    unit, scale = suit_unit("m", float(extent))
-    x, y = x * scale.over / scale.times, y * scale.over / scale.times
+    unit, x, y = _in_one_unit(x, y)
     path.plot(x, y, color=_ink(), label="upper point")
     path.plot(x[0], y[0], "o", color="C0", label="start of the period")
     moments = np.linspace(0, x.size - 1, _ARROWS + 1).astype(int)[:-1]
@@ -755,12 +697,6 @@ def _draw_path(path: Any, x: Array, y: Array, Fx: Array, Fy: Array) -> None:
     )
     path.update_datalim(tips)
     path.margins(0.08)
-    unit_text = unit.replace("um", "µm")
-    path.set(
-        xlabel=f"$x$ [{unit_text}]",
-        ylabel=f"$y$ [{unit_text}]",
-        aspect="equal",
-        adjustable="datalim",
-    )
+    path.set(xlabel=f"$x$ [{unit}]", ylabel=f"$y$ [{unit}]", aspect="equal", adjustable="datalim")
     path.autoscale_view()
     head(path, "")

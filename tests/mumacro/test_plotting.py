@@ -20,7 +20,6 @@ pyplot.switch_backend("agg")
 
 CASE: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3, "v0": 0.01}
 SPEEDS = np.geomspace(1e-4, 10.0, 9)
-TURN = np.arange(64) * math.tau / 64
 RIG: Case = {"Fz": 10.0, "f": 20e3}
 kinds = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: "-".join(kind.names.values()))
 
@@ -71,8 +70,6 @@ PICTURES: dict[str, Callable[[Surrogate], Any]] = {
     "motion": lambda _: mumacro.motion(
         **MOTION, x=[(1, 1e-4, 0.0), (3, 2e-5, 45.0)], y=2e-5, normal=(8.0, -90.0)
     ),
-    "cycle": lambda _: mumacro.motion(**MOTION, x=1e-4, y=2e-5, normal=(8.0, -90.0)).cycle(),
-    "harmonics": lambda _: mumacro.harmonics(np.sin(TURN) + 0.2 * np.cos(3.0 * TURN) + 1.0),
     "solution": lambda s: mumacro.solve_for(s, "y0", [0.1, 0.2], **case_of(KINDS[0], y0=None)),
     "solution over f": lambda s: mumacro.solve_for(
         s, "f", 0.2, within=("1kHz", "1MHz"), **case_of(KINDS[0], f=None)
@@ -123,7 +120,7 @@ def test_nothing_is_cut_off_and_the_style_stays(
 @pytest.mark.parametrize(
     ("name", "panels"),
     [(name, 1) for name in PICTURES]
-    + [(name, 2) for name in PICTURES if name.startswith(("motion", "cycle", "fit"))],
+    + [(name, 2) for name in PICTURES if name.startswith(("motion", "fit"))],
 )
 def test_axes_that_are_given_are_drawn_on_and_the_first_are_returned(
     surrogate: Surrogate, name: str, panels: int

@@ -481,7 +481,7 @@ def write_result(
     path: Path,
     columns: Mapping[str, Any],
     draw: Callable[[Any], Any],
-    panels: plotting.Panels = plotting.Panels(),  # noqa: B008 - it cannot change
+    **panels: Any,
 ) -> str:
     """Write ``-o``: x.csv with the columns under their headers, with all digits; or a picture.
     Return a line that names the file."""
@@ -493,7 +493,7 @@ def write_result(
                 zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True)
             )
     else:
-        plotting.save(path, draw, panels)
+        plotting.save(path, draw, **panels)
     return f"written: {path}"
 
 

@@ -107,7 +107,7 @@ def _output(result: Fit, options: Namespace, surrogate: Surrogate) -> str:
         columns = dict(zip(heads, result.points.values(), strict=True))
         columns |= {"mu_macro fitted": result.points["mu_macro"] - result.residuals}
         return (
-            common.write_result(options.out, columns, result.plot, plotting.OF_FIT)
+            common.write_result(options.out, columns, result.plot, **plotting.OF_FIT)
             + "\n"
             + _text(result, options.digits)
         )

@@ -96,7 +96,7 @@ def run(words: Sequence[str]) -> str:
     if options.out is not None:
         heads = ("displacement [m]", "force [N]", "Fz [N]", "force fitted [N]")
         columns = dict(zip(heads, found.loop.values(), strict=True))
-        report = common.write_result(options.out, columns, found.plot, plotting.OF_FIT)
+        report = common.write_result(options.out, columns, found.plot, **plotting.OF_FIT)
     if options.json:
         return as_json(found.to_dict())
     return "\n".join(filter(None, [report, _text(found)]))

@@ -98,7 +98,7 @@ def run(words: Sequence[str]) -> str:
     columns = {}
     if options.out.suffix == ".csv":
         columns = {f"{name} [{_SI[name]}]": x for name, x in motion.cycle()._asdict().items()}
-    report = common.write_result(options.out, columns, motion.plot, plotting.OF_CYCLE)
+    report = common.write_result(options.out, columns, motion.plot, **plotting.OF_CYCLE)
     return lines if options.json else f"{lines}\n{report}"
 
 

@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from mumacro import plotting
 from mumacro.errors import InputError
 from mumacro.inputs.carried import carried_unit
 from mumacro.inputs.columns import to_si
 from mumacro.inputs.fields import Numbers
 from mumacro.kernel.arrays import Array
-from mumacro.motions.oscillation import MOST_HARMONIC
+from mumacro.motions.oscillation import MEMBERS, MOST_HARMONIC
 from mumacro.results import NOTE, Note, Result, texts_of
 
 # Relative to the largest sample: the rounding error of a term, and of the difference between equal
@@ -39,30 +38,12 @@ class Harmonics(Result):
     @property
     def columns(self) -> dict[str, Any]:
         """Return the terms as columns: harmonic, amplitude, phase."""
-        numbers, amplitudes, phases = zip(*self.terms, strict=True) if self.terms else ((), (), ())
-        return {
-            "harmonic": np.array(numbers, np.int64),
-            "amplitude": np.array(amplitudes),
-            "phase": np.array(phases),
-        }
-
-    def plot(self, ax: Any = None) -> Any:
-        """Draw the amplitude of each harmonic, and the root mean square of the rest.
-
-        ``ax`` are matplotlib axes, or None for new ones.  They are returned.
-        """
-        columns = self.columns
-        title = f"mean {self.mean:.6g}, rms of what is left out {self.rms:.3g}"
-        return plotting.plot_harmonics(
-            columns["harmonic"], columns["amplitude"], self.rms, title, ax
-        )
+        return {name: np.array([term[i] for term in self.terms]) for i, name in enumerate(MEMBERS)}
 
     def _members(self) -> dict[str, Any]:
         """Return the terms as dicts, as HTTP takes them, and the root mean square of the rest."""
-        names = ("harmonic", "amplitude", "phase")
-        terms = [dict(zip(names, term, strict=True)) for term in self.terms]
         return {
-            "terms": terms,
+            "terms": [dict(zip(MEMBERS, term, strict=True)) for term in self.terms],
             "mean": self.mean,
             "rms": self.rms,
             "notes": texts_of(self.notes, NOTE),

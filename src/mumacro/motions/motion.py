@@ -75,15 +75,6 @@ class Cycle(Result, _Cycle):
         """Return the times, and the displacements and forces at each time."""
         return self._asdict()
 
-    def plot(self, ax: Any = None) -> Any:
-        """Draw the forces over the period, and next to them the path of the upper point with the
-        force at 16 moments.
-
-        ``ax`` is a pair of matplotlib axes, or one (then no path is drawn), or None for new ones.
-        The axes of the forces are returned.
-        """
-        return plotting.plot_cycle(*self, ax=ax)
-
     def _heading(self) -> str:
         return f"<Cycle of {self.t.size} times>"
 

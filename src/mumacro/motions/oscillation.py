@@ -27,7 +27,7 @@ _SAMPLES = (
     "degrees); samples of a motion over its period are turned into harmonics by "
     "mumacro.harmonics(samples).terms"
 )
-_MEMBERS = ("harmonic", "amplitude", "phase")
+MEMBERS = ("harmonic", "amplitude", "phase")
 #: harmonic, amplitude in SI, phase in degrees; the last two are numbers or arrays
 Harmonic = tuple[int, Any, Any]
 
@@ -139,9 +139,9 @@ def _reads(read_part: Callable[[str, Any], Any], name: str, text: str) -> bool:
 
 
 def _of_mapping(name: str, value: Mapping[str, Any]) -> tuple[Any, Any, Any]:
-    if unknown := [member for member in value if member not in _MEMBERS]:
+    if unknown := [member for member in value if member not in MEMBERS]:
         raise InputError(
-            f"{name}, {unknown[0]}", value[unknown[0]], unknown_name(str(unknown[0]), _MEMBERS)
+            f"{name}, {unknown[0]}", value[unknown[0]], unknown_name(str(unknown[0]), MEMBERS)
         )
     if value.get("amplitude") is None:
         raise InputError(f"{name}, amplitude", None, "given")
@@ -159,7 +159,7 @@ def _harmonic(name: str, value: Any) -> int:
 
 
 def _amplitude(name: str, value: Any) -> Any:
-    size = _plain(f"{name}, amplitude", value, QUANTITY_OF[name])
+    size = to_si(f"{name}, amplitude", value, QUANTITY_OF[name])
     if np.ndim(size):
         _refuse_samples(name, size)
     return size
@@ -178,9 +178,4 @@ def _refuse_samples(name: str, values: Any) -> None:
 
 
 def _phase(name: str, value: Any) -> Any:
-    return _plain(f"{name}, phase", value, "angle")
-
-
-def _plain(name: str, value: Any, quantity: str) -> Any:
-    """Return numbers in SI; refuse a deviation."""
-    return to_si(name, value, quantity)
+    return to_si(f"{name}, phase", value, "angle")

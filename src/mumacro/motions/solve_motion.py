@@ -83,17 +83,15 @@ class MotionSolution(Solution):
         mean, _ = MotionCurve(self.unknown, self.of, self.case).evaluate(x)
         case = {name: value for name, value in self.case.items() if name in INPUTS}
         title = plotting.case_title(case, {"contact": self.case.get("contact", "spring")})
-        axis, log = _axis(self.unknown), _log(x[0], x[-1])
-        return plotting.plot_roots(
-            axis,
+        each = zip(self.targets, self.roots, strict=True)
+        return plotting.plot_law(
+            self.unknown,
             x,
             mean,
-            self.of,
-            self.targets,
-            places,
-            log,
             ax,
-            f"{title}\n{self._motion_words()}",
+            of=self.of,
+            roots_of={target: [root.value for root in roots] for target, roots in each},
+            title=f"{title}\n{self._motion_words()}",
         )
 
     def _motion_words(self) -> str:
@@ -360,7 +358,3 @@ def _usual_range(unknown: str, curve: MotionCurve) -> tuple[float, float]:
 def _log(low: float, high: float) -> bool:
     """Return whether a range is searched and drawn in logarithms."""
     return low > 0.0 and high / low > _DECADES
-
-
-def _axis(unknown: str) -> str:
-    return f"{unknown} [{unit_of(unknown)}]"
