@@ -59,12 +59,12 @@ PYTHON = {
     "mumacro.motion, mumacro.harmonics, mumacro.solve_motion": (
         "mumacro.motion", "mumacro.Motion", "mumacro.motions.motion.Cycle", "mumacro.harmonics",
         "mumacro.Harmonics", "mumacro.solve_motion", "mumacro.MotionSolution",
-        "mumacro.motions.solve_motion.MotionRoot",
+        "mumacro.questions.search.Root",
     ),
     "mumacro.law, mumacro.solve_for": (
         "mumacro.law", "mumacro.questions.law.Law", "mumacro.questions.borders.Crossing",
         "mumacro.solve_for", "mumacro.questions.solve_for.TableSolution",
-        "mumacro.questions.solve_for.Root", "mumacro.questions.solutions.Reach",
+        "mumacro.questions.solve_for.TableRoot", "mumacro.questions.solutions.Reach",
     ),
     "mumacro.closed_forms": ("mumacro.closed_forms",),
     "mumacro.stiffness": ("mumacro.stiffness",),

@@ -57,7 +57,8 @@ def _law(question: LawRequest, table: LoadedTable) -> tuple[Law, dict[str, list[
         **case,
         **question.deviations,
     )
-    answer = table.surrogate.answer(law.cases, chosen(question.outputs, law.cases))
+    cases = law.answer.cases
+    answer = table.surrogate.answer(cases, chosen(question.outputs, cases))
     columns = {path: listed(path, answer[path]) for path in answer.paths}
     columns["mu_static"] = law.mu_static.tolist()
     if law.stiffening is not None:
@@ -252,6 +253,6 @@ def _included(
     values = np.array([root.value for roots in solution.roots for root in roots])
     if not (question.outputs or question.deviations) or not values.size:
         return [{}] * values.size
-    outputs = _answer_at(question, table, unknown, values, solution.stiffening).outputs
+    outputs = _answer_at(question, table, unknown, values, solution.curve.stiffening).outputs
     rows = zip(*(column.tolist() for column in outputs.values()), strict=True)
     return [nested(dict(zip(outputs, row, strict=True))) for row in rows]

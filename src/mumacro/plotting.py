@@ -203,23 +203,28 @@ def _in_suited_unit(si: str, *values: float) -> str:
     return f"{numbers} {unit_text}".rstrip()
 
 
-def oscillation_words(symbol: str, unit: str, terms: Iterable[tuple[int, float, float]]) -> str:
-    """Return an oscillation in words from harmonics, amplitudes in an SI unit and phases in
-    degrees; empty if there is no harmonic.
+def motion_words(parts: Mapping[str, Iterable[tuple[int, float, float]]]) -> str:
+    """Return a motion in words from the harmonics of its parts, their amplitudes in SI and their
+    phases in degrees; a part that has no amplitude is left out.
 
-    >>> oscillation_words("$x$", "m", [(1, 2e-6, 90.0), (3, 4e-7, 0.0)])
+    >>> motion_words({"x": [(1, 2e-6, 90.0), (3, 4e-7, 0.0)], "y": [(1, 0.0, 0.0)]})
     '$x$: 2 µm at 90°, 3rd harmonic 0.4 µm'
     """
-    parts = []
-    for harmonic, amplitude, degrees in terms:
-        last = 0 if harmonic // 10 % 10 == 1 else harmonic % 10
-        ending = {1: "st", 2: "nd", 3: "rd"}.get(last, "th")
-        order = "" if harmonic == 1 else f"{harmonic}{ending} harmonic "
-        # whole turns have no effect
-        phase = math.remainder(degrees, 360.0)
-        behind = f" at {phase:.4g}°" if abs(phase) > 1e-9 else ""
-        parts.append(f"{order}{_in_suited_unit(unit, amplitude)}{behind}")
-    return f"{symbol}: {', '.join(parts)}" if parts else ""
+    texts = []
+    for name, terms in parts.items():
+        symbol, unit = ("$F_z$", "N") if name == "normal" else (f"${name}$", "m")
+        words = [_term_words(unit, *term) for term in terms if term[1] > 0.0]
+        texts += [f"{symbol}: {', '.join(words)}"] if words else []
+    return "; ".join(texts)
+
+
+def _term_words(unit: str, harmonic: int, amplitude: float, degrees: float) -> str:
+    last = 0 if harmonic // 10 % 10 == 1 else harmonic % 10
+    ending = {1: "st", 2: "nd", 3: "rd"}.get(last, "th")
+    order = "" if harmonic == 1 else f"{harmonic}{ending} harmonic "
+    phase = math.remainder(degrees, 360.0)  # whole turns have no effect
+    behind = f" at {phase:.4g}°" if abs(phase) > 1e-9 else ""
+    return f"{order}{_in_suited_unit(unit, amplitude)}{behind}"
 
 
 def _axis(name: str) -> str:

@@ -21,7 +21,7 @@ from mumacro.inputs.fields import AMPLITUDE, ENDS, NAMES
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.units import Unit, choose_unit, format_number, tidy_zeros
 from mumacro.motions.solve_motion import UNKNOWNS
-from mumacro.questions.solve_for import Root, TableSolution, solve_for
+from mumacro.questions.solve_for import TableRoot, TableSolution, solve_for
 
 EXAMPLE = 'mumacro solve-for y0 "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s" --target 0.15'
 _TARGET = ": give mu_macro, such as 0.15 or 15%, or with --ratio mu_macro/mu0"
@@ -147,7 +147,7 @@ def _heads(unknown: str, k: str | None) -> list[str]:
 
 def _table(
     unknown: str,
-    rows: Sequence[tuple[Any, Root]],
+    rows: Sequence[tuple[Any, TableRoot]],
     unit: Unit,
     k_unit: Unit | None,
     count: int,

@@ -196,22 +196,13 @@ class Motion(Result):
         i = self._place(index)
         case = {name: float(column[i]) for name, column in self.scenes.columns.items()}
         title = plotting.case_title(case, {"contact": self.scenes.contact})
-        title = f"{title}\n{'; '.join(self._oscillations(i))}".rstrip()
+        terms = (
+            [(term.harmonic, term.amplitude[i], math.degrees(term.phase[i])) for term in part]
+            for part in self.scenes.terms
+        )
+        words = plotting.motion_words(dict(zip(PARTS, terms, strict=True)))
+        title = f"{title}\n{words}".rstrip()
         return plotting.plot_cycle(*self.cycle(index), case["mu0"], title, ax)
-
-    def _oscillations(self, i: int) -> list[str]:
-        """Return the amplitudes and phases of a case in words: one text for each part that
-        oscillates."""
-        words = []
-        for symbol, part in zip(("$x$", "$y$", "$F_z$"), self.scenes.terms, strict=True):
-            unit = "N" if symbol == "$F_z$" else "m"
-            terms = [
-                (term.harmonic, float(term.amplitude[i]), math.degrees(term.phase[i]))
-                for term in part
-                if term.amplitude[i] > 0.0
-            ]
-            words.append(plotting.oscillation_words(symbol, unit, terms))
-        return [text for text in words if text]
 
     def _place(self, index: int | None) -> int:
         n = np.size(self.mu_macro)
@@ -423,26 +414,16 @@ def _legal(scenes: Scenes, one: bool) -> Bools:
             require(f"{name}, amplitude", holds, size, "finite and >= 0")
             require(f"{name}, phase", np.isfinite(term.phase), term.phase, "finite, in degrees")
     lowest = _lowest_load(scenes, legal)
-    swing = sum((term.amplitude for term in scenes.terms[2]), np.zeros(legal.size))
+    still, x_and_y = np.zeros(legal.size), [*scenes.terms[0], *scenes.terms[1]]
+    swing = sum((term.amplitude for term in scenes.terms[2]), still)
     require("normal", lowest > 0.0, swing, _LIFTS_OFF)
-    swings = sum(
-        (term.amplitude for part in scenes.terms[:2] for term in part), np.zeros(legal.size)
-    )
-    require("v0", (c["v0"] > 0.0) | (swings > 0.0), c["v0"], _STILL)
+    swing = sum((term.amplitude for term in x_and_y), still)
+    require("v0", (c["v0"] > 0.0) | (swing > 0.0), c["v0"], _STILL)
     with np.errstate(all="ignore"):
         length = scenes.length
         drag = c["v0"] / c["omega"] / length
-        fastest = np.maximum(
-            drag,
-            sum(
-                (
-                    term.harmonic * (term.amplitude / length)
-                    for part in scenes.terms[:2]
-                    for term in part
-                ),
-                np.zeros(legal.size),
-            ),
-        )
+        shaken = sum((term.harmonic * (term.amplitude / length) for term in x_and_y), still)
+        fastest = np.maximum(drag, shaken)
     unit = "mu0 Fz / k per radian of omega t"
     holds = np.isfinite(length) & (length > 0.0)
     require("mu0 Fz / k", holds, length, "a length > 0 within the range of numbers")

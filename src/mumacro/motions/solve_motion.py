@@ -8,7 +8,7 @@ A mean force over one input of a motion may rise and fall several times.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.motions.motion import PARTS, motion
 from mumacro.motions.oscillation import read_oscillation
-from mumacro.questions.search import Found, Search
+from mumacro.questions.search import Root, Search
 from mumacro.questions.solutions import Reach, Solution
 
 #: inputs of a motion that may be unknown
@@ -37,23 +37,11 @@ _DRAWN = 200  # additional points of a curve in a picture
 _DECADES = 20.0  # a range whose ends differ by more than this factor is searched in logarithms
 
 
-class MotionRoot(NamedTuple):
-    """Hold one value of the unknown."""
-
-    value: float  #: the unknown [SI], a phase in degrees
-    #: between them the mean force differs from the target by less than its error estimate, to first
-    #: order
-    low: float
-    high: float
-    mean: float  #: the mean force divided by the mean load at this value [-]
-    error_estimate: float  #: its error estimate [-]
-
-
 @dataclass(frozen=True, repr=False)
 class MotionSolution(Solution):
     """Hold all roots of every target, over a motion."""
 
-    _root = MotionRoot
+    _root = Root
     #: for v0 without a root: the solution for the opposite x (turned by 180 degrees), which moves
     #: the body the other way; None if that has no root either
     other_way: "MotionSolution | None"
@@ -77,32 +65,27 @@ class MotionSolution(Solution):
         """Draw the mean force over the unknown with the targets and their roots.  ``ax`` are
         matplotlib axes, or None for new ones.  They are returned."""
         x, _ = self.samples
-        places = [root.value for roots in self.roots for root in roots]
+        each = zip(self.targets, self.roots, strict=True)
+        roots_of = {target: [root.value for root in roots] for target, roots in each}
         even = np.geomspace if _log(x[0], x[-1]) else np.linspace
-        x = np.unique(np.clip([*x, *even(x[0], x[-1], _DRAWN), *places], x[0], x[-1]))
+        x = np.unique([*x, *even(x[0], x[-1], _DRAWN)])
         mean, _ = MotionCurve(self.unknown, self.of, self.case).evaluate(x)
         case = {name: value for name, value in self.case.items() if name in INPUTS}
         title = plotting.case_title(case, {"contact": self.case.get("contact", "spring")})
-        each = zip(self.targets, self.roots, strict=True)
+        terms = {
+            part: [(n, float(a), float(p)) for n, a, p in read_oscillation(part, value)]
+            for part, value in ((part, self.case.get(part, 0.0)) for part in PARTS)
+            if not self.unknown.startswith(part)
+        }
         return plotting.plot_law(
             self.unknown,
             x,
             mean,
             ax,
             of=self.of,
-            roots_of={target: [root.value for root in roots] for target, roots in each},
-            title=f"{title}\n{self._motion_words()}",
+            roots_of=roots_of,
+            title=f"{title}\n{plotting.motion_words(terms)}",
         )
-
-    def _motion_words(self) -> str:
-        """Return the oscillations in words, without the unknown part."""
-        words = []
-        for part, symbol, unit in (("x", "$x$", "m"), ("y", "$y$", "m"), ("normal", "$F_z$", "N")):
-            terms = read_oscillation(part, self.case.get(part, 0.0))
-            shown = [(n, float(a), float(p)) for n, a, p in terms if np.any(a)]
-            if not self.unknown.startswith(part):
-                words.append(plotting.oscillation_words(symbol, unit, shown))
-        return "; ".join(filter(None, words))
 
     def _members(self) -> dict[str, Any]:
         other = self.other_way
@@ -189,7 +172,7 @@ def _solved(curve: "MotionCurve", low: float, high: float, targets: Array) -> Mo
         unknown=curve.unknown,
         of=curve.of,
         targets=tuple(targets.tolist()),
-        roots=tuple(tuple(MotionRoot(*root) for root in of_target) for of_target in found),
+        roots=tuple(map(tuple, found)),
         reach=Reach(low, high, *search.extremes),
         constant=search.constant,
         other_way=None,
@@ -208,7 +191,7 @@ def _places(curve: "MotionCurve", low: float, high: float) -> Array:
     return (np.geomspace if _log(low, high) else np.linspace)(low, high, FIRST)
 
 
-def _without_whole_turn(roots: list[Found]) -> list[Found]:
+def _without_whole_turn(roots: list[Root]) -> list[Root]:
     """Return each root of a phase once: 360 degrees is the same as 0."""
     around = len(roots) > 1 and roots[-1].high - 360.0 >= roots[0].low
     return roots[:-1] if around else roots
@@ -263,11 +246,10 @@ class MotionCurve:
         else:
             case[self.unknown] = values
         answer = motion(**case)
-        shape = values.shape
-        mean, error = getattr(answer, self.of), answer.error_estimate
-        return np.broadcast_to(mean, shape).astype(float), np.broadcast_to(error, shape).astype(
-            float
+        mean, error = (
+            np.asarray(x, float) for x in (getattr(answer, self.of), answer.error_estimate)
         )
+        return np.broadcast_to(mean, values.shape), np.broadcast_to(error, values.shape)
 
     def number(self, name: str) -> float:
         """Return one known input of the case [SI]."""

@@ -2,25 +2,19 @@
 ends."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from mumacro.contacts.stiffening import Stiffening
-from mumacro.inputs.cases import fixed_inputs
-from mumacro.inputs.fields import kind_of
 from mumacro.kernel.arrays import Array, Bools, Places
 from mumacro.questions.input_curve import EVERYWHERE, InputCurve
 from mumacro.questions.search import TINY, last_double
-from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import STEEPEST_Y
 
 #: regime -> the border at which it begins or ends
 BORDER_NAMES = {
-    "reverse_slip": "border of reverse slip",
     "continuous": "border of continuous sliding",
+    "reverse_slip": "border of reverse slip",
 }
 
 
@@ -36,40 +30,28 @@ class Crossing:
     @property
     def name(self) -> str:
         """Return the name of the border."""
-        regime = next(regime for regime in ("continuous", "reverse_slip") if regime in self.regimes)
-        return BORDER_NAMES[regime]
+        return next(name for regime, name in BORDER_NAMES.items() if regime in self.regimes)
 
 
-def border_crossings(
-    surrogate: Surrogate,
-    along: str,
-    case: Mapping[str, Any],
-    low: float,
-    high: float,
-    *,
-    contact: str = "spring",
-    direction: str = "across",
-    stiffening: Stiffening | None = None,
-) -> tuple[Crossing, ...]:
-    """Return the values in ``low <= along <= high`` where continuous sliding or (along) reverse
-    slip begins or ends, ascending.
+def border_crossings(curve: InputCurve, low: float, high: float) -> tuple[Crossing, ...]:
+    """Return the values of the unknown in a range where continuous sliding or (along) reverse slip
+    begins or ends, ascending.
 
-    ``case`` holds the other five inputs; with a ``stiffening``, k grows with Fz.  The border of
-    continuous sliding is crossed at most once, or twice (across, over mu0, Fz or k).  A rigid
-    contact never sticks, and without oscillation there is no border, so the list is empty.
+    The border of continuous sliding is crossed at most once, or twice (across, over mu0, Fz or k).
+    A rigid contact never sticks, and without oscillation there is no border, so the list is empty.
     """
-    kind = kind_of(contact, direction)
-    curve = InputCurve(surrogate, fixed_inputs(case, along, kind), along, kind, stiffening)
     if curve.case.get("k") == math.inf or 0.0 in curve.case.values() or curve.proportional:
         return ()
     low = max(low, TINY)  # at 0 there is no oscillation or no sliding
     # On a ray v~/v~crit(y~) is smallest at STEEPEST_Y, where d ln v~crit / d ln y~ = 1.  The
     # derivative falls strictly from 2 to 1/2 (20,001 samples from 1e-6 to 1e12), so each side of
     # STEEPEST_Y crosses the border at most once.
-    middle = low if along in EVERYWHERE or direction != "across" else curve.where(STEEPEST_Y)
+    middle = low
+    if curve.unknown not in EVERYWHERE and not curve.kind.direction:
+        middle = curve.where(STEEPEST_Y)
     edges = np.array([low, middle, high] if low < middle < high else [low, high])
     pairs = []
-    for regime in ("continuous", "reverse_slip"):
+    for regime in BORDER_NAMES:
         state = curve.answer(edges).regime == regime
         i = np.flatnonzero(state[1:] != state[:-1])
 

@@ -11,7 +11,6 @@ from mumacro.contacts.stiffening import Stiffening
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.fields import AMPLITUDE, SPRING, Kind
 from mumacro.kernel.arrays import Array
-from mumacro.outputs.gradient import GRADIENT
 from mumacro.surrogate import Surrogate
 
 EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # inputs that are searched over all legal values
@@ -39,40 +38,16 @@ class InputCurve:
         self.surrogate, self.case, self.unknown, self.kind = surrogate, case, unknown, kind
         self.stiffening = None if case.get("k") == math.inf else stiffening
 
-    def answer(
-        self,
-        x: Any,
-        *,
-        gradient: bool = False,
-        groups: bool = False,
-        strict: bool = False,
-        **replaced: Any,
-    ) -> Answer[Any]:
-        """Return the surrogate's answers at values ``x`` (n,) of the input [SI].
+    def answer(self, x: Any, **replaced: Any) -> Answer[Any]:
+        """Return the surrogate's answers at values ``x`` (n,) of the input [SI]; NaN for a value
+        out of bounds.  ``replaced`` has other values for inputs of the case."""
+        return self.surrogate.answer(self.cases(x, strict=False, **replaced))
 
-        ``replaced`` has other values for inputs of the case.  For a value out of bounds the answer
-        is NaN, or, if ``strict``, InputError is raised.
-        """
-        cases = self.cases(x, strict, **replaced)
-        return self.surrogate.answer(cases, (GRADIENT,) if gradient else (), groups)
-
-    def cases(self, x: Any, strict: bool, **replaced: Any) -> Cases:
-        """Return the cases that :meth:`answer` evaluates; ``replaced`` may also have deviations."""
+    def cases(self, x: Any, strict: bool = True, **replaced: Any) -> Cases:
+        """Return the cases of :meth:`answer`; ``replaced`` may also have deviations.  If
+        ``strict``, raise InputError for a value out of bounds."""
         k = {} if self.stiffening is None else self.stiffening.scaled(self.case, x)
         return Cases.of({**self.case, **k, self.unknown: x, **replaced}, self.kind, strict)
-
-    def groups(self, x: float) -> tuple[float, float]:
-        """Return v~ and y~ at one value of the input, computed from the inputs alone."""
-        c = self.cases(x, True).columns
-        swing = c[AMPLITUDE] / c["Fz"] if self.kind.normal else None
-        with np.errstate(all="ignore"):
-            stiffness = np.float64(c["k"]) / (c["mu0"] * c["Fz"])
-            y = c["y0"] * stiffness if swing is None else swing
-            return float(c["v0"] / np.float64(c["omega"]) * stiffness), float(y)
-
-    def mu(self, x: Array) -> Array:
-        """Return mu_macro [-] at ``x`` (n,)."""
-        return np.asarray(self.answer(x).mu_macro)
 
     def evaluate(self, x: Array) -> tuple[Array, Array]:
         """Return mu_macro [-] at ``x`` and its error bound, in the shape of ``x``."""
@@ -82,11 +57,11 @@ class InputCurve:
     def refined(self, values: Array) -> Array:
         """Return ``values``, and more values where straight lines between them would be far from
         mu_macro."""
-        mu = self.mu(values)
+        mu = self.evaluate(values)[0]
         for _ in range(_HALVINGS):
             low, high = values[:-1], values[1:]
             middle = np.where(low > 0.0, np.sqrt(low) * np.sqrt(high), 0.5 * high)
-            middle_mu = self.mu(middle)
+            middle_mu = self.evaluate(middle)[0]
             bent = np.abs(middle_mu - 0.5 * (mu[:-1] + mu[1:])) > _CHORD * np.ptp(mu)
             indices = np.flatnonzero(bent & (middle > low) & (middle < high))
             if not indices.size:

@@ -14,7 +14,7 @@ from mumacro.answer import BAND, Answer
 from mumacro.contacts.stiffening import Stiffening, stiffening_of
 from mumacro.errors import InputError
 from mumacro.inputs.case import read, read_one
-from mumacro.inputs.cases import DEVIATIONS, Cases, fixed_inputs, named, without_interval
+from mumacro.inputs.cases import DEVIATIONS, fixed_inputs, named, without_interval
 from mumacro.inputs.columns import is_column, to_si
 from mumacro.inputs.fields import (
     AMPLITUDE,
@@ -48,7 +48,6 @@ class Law(Result):
     #: the results, arrays (n,).  With an interval of k: the results at its geometric middle, and
     #: the band.  With deviations of inputs: also the deviation of mu_macro
     answer: Answer[Any]
-    cases: Cases  #: the inputs at each value, with their deviations or intervals
     #: static limit (v0 -> 0) of each case [-], for one spring across eq. (38), shape (n,)
     mu_static: Array
     #: the values in the range where continuous sliding (along: reverse slip) begins or ends
@@ -153,8 +152,6 @@ def sweep_values(along: str, start: float, stop: float, points: int, scale: str)
     Raise InputError if the ends are out of bounds or not ascending, if a logarithmic range begins
     at 0, or if there are fewer than two points.
     """
-    if along not in (*NAMES, AMPLITUDE):
-        raise InputError("along", along, f"one of {', '.join(NAMES)}, {AMPLITUDE}")
     if scale not in SCALES:
         raise InputError("scale", scale, f"one of {', '.join(SCALES)}")
     if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or points < 2:
@@ -286,10 +283,7 @@ def law(
     middle_case, stiffening = stiffening_of(middle_case, name, kind, stiffness_exponent)
     inputs = fixed_inputs(middle_case, along, kind)
     curve = InputCurve(surrogate, inputs, name, kind, stiffening)
-    ends_of_range = float(x[0]), float(x[-1])
-    border = border_crossings(
-        surrogate, name, inputs, *ends_of_range, **kind.names, stiffening=stiffening
-    )
+    border = border_crossings(curve, float(x[0]), float(x[-1]))
     if refine:
         x = curve.refined(np.union1d(x, [crossing.value for crossing in border]))
         axis = x / per
@@ -300,10 +294,10 @@ def law(
     if stiffening is not None and "std_k" in deviations:  # it grows in the same way as k
         relative = read_one("std_k", deviations["std_k"]) / inputs["k"]
         deviations["std_k"] = stiffening.stiffness(inputs["k"], x) * relative
-    cases = whole.cases(x, True, **deviations)
+    cases = whole.cases(x, **deviations)
     answer = surrogate.answer(cases, chosen((), cases), groups=True)
     at_rest = curve.answer(x, v0=0.0) if name != "v0" else curve.answer(0.0)
     mu_static = np.broadcast_to(at_rest.mu_macro, x.shape)
     k_ends = (float(ends[ENDS[0]]), float(ends[ENDS[1]])) if ends else None
     marks = tuple(replace(crossing, value=crossing.value / per) for crossing in border)
-    return Law(along, axis, answer, cases, mu_static, marks, inputs, kind, curve.stiffening, k_ends)
+    return Law(along, axis, answer, mu_static, marks, inputs, kind, curve.stiffening, k_ends)

@@ -24,7 +24,7 @@ from mumacro.kernel.arrays import Array, Bools, Places
 TINY = 5e-324
 LEVELS = 7  # number of times that an interval between samples is halved
 # An interval is not searched if all targets are further away than this many times the difference
-# between a sample and the cubic through its neighbours.  Found with 1,000 random problems
+# between a sample and the cubic through its neighbours.  Root with 1,000 random problems
 # (benchmarks/solve_motion.py): with 1 a root was missed.
 _CLEAR = 4.0
 _ROUNDING = 2.0**-50  # relative to a target: the rounding error of a value whose error is 0
@@ -55,15 +55,15 @@ class Curve(Protocol):
         ...
 
 
-class Found(NamedTuple):
+class Root(NamedTuple):
     """Hold a place that reaches a target."""
 
-    value: float  #: the first place that reaches the target
-    #: between them the function equals the target within its error
+    value: float  #: the unknown [SI], a phase in degrees: the first place that reaches the target
+    #: between them the function equals the target within its error (for a motion to first order)
     low: float
     high: float
-    mean: float  #: value of the function at ``value``
-    error: float  #: its error
+    mean: float  #: the function at this value: a mean friction [-]
+    error_estimate: float  #: the estimate of its error [-]
 
 
 class Samples:
@@ -123,7 +123,7 @@ class Search:
         self.samples = Samples(curve)
         self.samples.add(places)
 
-    def roots(self) -> list[list[Found]]:
+    def roots(self) -> list[list[Root]]:
         """Return the roots of each target, ascending.  A range of roots counts as one root, and so
         do roots whose ranges overlap."""
         self._refine()
@@ -143,9 +143,9 @@ class Search:
         )
         which, places = which[real], places[real]
         low, high = self._widths(function, which, places)
-        roots: list[list[Found]] = [[] for _ in self.targets]
+        roots: list[list[Root]] = [[] for _ in self.targets]
         columns = (part.tolist() for part in (places, low, high, value[real], error[real]))
-        for k, root in sorted(zip(which.tolist(), map(Found, *columns), strict=True)):
+        for k, root in sorted(zip(which.tolist(), map(Root, *columns), strict=True)):
             of_target = roots[k]
             if of_target and root.low <= of_target[-1].high:
                 widest = max(of_target[-1].high, root.high)

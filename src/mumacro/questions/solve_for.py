@@ -39,11 +39,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mumacro.contacts.stiffening import Stiffening, stiffening_of
+from mumacro.contacts.stiffening import stiffening_of
 from mumacro.errors import InputError
 from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import fixed_inputs, real, without_interval
-from mumacro.inputs.fields import AMPLITUDE, ENDS, POSITIVE, QUANTITY_OF, Numbers, field_of, kind_of
+from mumacro.inputs.fields import AMPLITUDE, POSITIVE, QUANTITY_OF, Numbers, field_of, kind_of
 from mumacro.kernel.arrays import Array
 from mumacro.questions.input_curve import EVERYWHERE, InputCurve
 from mumacro.questions.law import law
@@ -51,7 +51,7 @@ from mumacro.questions.search import TINY, Search, samples
 from mumacro.questions.solutions import Reach, Solution
 from mumacro.results import Note
 from mumacro.surrogate import Surrogate
-from mumacro.validity import digits, effect_of_groups, load_notes
+from mumacro.validity import digits, effect_of, load_notes
 
 HUGE = 1.7976931348623157e308
 _DRAWN = 400  # points of a curve in a picture
@@ -67,7 +67,7 @@ _PER_DECADE, _PER_DECADE_MONOTONE = 100, 2
 _ENDS = {"across": (1e-6, 1e8), "along": (1e-17, 1e30), "normal": (1e-17, 10.0)}
 
 
-class Root(NamedTuple):
+class TableRoot(NamedTuple):
     """Hold one value of the unknown."""
 
     value: float  #: the unknown [SI]
@@ -83,16 +83,15 @@ class Root(NamedTuple):
 class TableSolution(Solution):
     """Hold all roots of every target, found with a table."""
 
-    _root = Root
+    _root = TableRoot
+    curve: InputCurve = field(compare=False)  #: what was searched; k is the middle of its interval
+    #: the words of the question: contact, direction, the other five inputs
+    question: dict[str, Any] = field(compare=False)
+    #: the range that the caller asked for [SI]; None for the default range
+    within: tuple[float, float] | None = field(compare=False)
     #: with an interval of k: the solutions for its lowest and its highest value; the other fields
     #: are for its geometric middle
     ends: tuple["TableSolution", "TableSolution"] | None = None
-    #: how k grows with Fz, if Fz is the unknown; None if k is constant
-    stiffening: Stiffening | None = None
-    #: the curve that was searched; k is the middle of its interval
-    curve: InputCurve | None = field(default=None, compare=False)
-    #: the range that the caller asked for [SI]; None for the default range
-    within: tuple[float, float] | None = field(default=None, compare=False)
 
     def _members(self) -> dict[str, Any]:
         """Return the members of every solution; ``ends`` has the answers for the softest and the
@@ -105,19 +104,15 @@ class TableSolution(Solution):
     def digits(self) -> int:
         """Return the number of digits that the uncertainty of k supports, at the first root."""
         first = next((root for roots in self.roots for root in roots), None)
-        if self.curve is None or first is None:
+        if first is None:
             return digits(0.0)
-        curve = self.curve
-        v, y = curve.groups(field_of(self.unknown)[1] * first.value)
-        return digits(effect_of_groups(curve.surrogate.tabulated, curve.kind, v, y))
+        return digits(effect_of(self.curve.answer(field_of(self.unknown)[1] * first.value)))
 
     @property
     def notes(self) -> list[Note]:
         """Return the notes about k, if Fz is the unknown."""
-        if self.curve is None:
-            return []
-        contact = self.curve.kind.names["contact"]
-        return load_notes(self.unknown, self.curve.case, contact, self.stiffening)
+        curve = self.curve
+        return load_notes(self.unknown, curve.case, curve.kind.names["contact"], curve.stiffening)
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the law over the unknown with the targets and their roots.  Draw it over the range
@@ -126,22 +121,12 @@ class TableSolution(Solution):
 
         ``ax`` are matplotlib axes, or None for new ones.  They are returned.
         """
-        if self.curve is None:
-            raise TypeError("a solution that solve_for has not made has no picture")
         roots_of: dict[float, list[float]] = {target: [] for target in self.targets}
         for one in (self, *(self.ends or ())):
             for target, roots in zip(self.targets, one.roots, strict=True):
                 roots_of[target] += (root.value for root in roots)
         every = [root for roots in roots_of.values() for root in roots] or [1.0]
         low, high = self.within or _around(every)
-        case: dict[str, Any] = dict(self.curve.case)
-        if self.stiffening is not None:
-            load, exponent = self.stiffening.load, self.stiffening.exponent
-            case |= {"Fz": load, "stiffness_exponent": exponent}
-        if self.ends is not None:
-            del case["k"]
-            curves = [end.curve for end in self.ends if end.curve is not None]
-            case |= {name: curve.case["k"] for name, curve in zip(ENDS, curves, strict=True)}
         over = law(
             self.curve.surrogate,
             self.unknown,
@@ -150,8 +135,7 @@ class TableSolution(Solution):
             points=_DRAWN,
             scale="log" if low > 0.0 else "linear",
             refine=True,
-            **self.curve.kind.names,
-            **case,
+            **self.question,
         )
         return over.plot(ax, roots_of=roots_of)
 
@@ -219,47 +203,22 @@ def solve_for(
     >>> [[f"{root.value:.4e} m" for root in roots] for roots in solution.roots]  # 0.4: above mu0
     [['2.8656e-06 m'], []]
     """
-    kind = kind_of(contact, direction)
-    name, (unknown, per) = unknown, field_of(unknown)
-    ends = None if within is None else _ends(name, within)
-    if per != 1.0:
-        # messages use the caller's name of the unknown
-        fixed_inputs(without_interval(case)[0], name, kind)
-        solution = solve_for(
-            surrogate,
-            unknown,
-            target,
-            within=None if ends is None else (per * ends[0], per * ends[1]),
-            contact=contact,
-            direction=direction,
-            stiffness_exponent=stiffness_exponent,
-            **case,
-        )
-        solution = _in_unit(solution, name, per)
-        if ends is None:
-            return solution
-        low, high = ends
-        reach = replace(solution.reach, low=low, high=high)
-        return replace(solution, reach=reach, within=ends)
-    inputs, interval = without_interval(case, unknown)
-    if interval:
-        softest, middle, stiffest = (
-            solve_for(
-                surrogate,
-                unknown,
-                target,
-                within=ends,
-                contact=contact,
-                direction=direction,
-                stiffness_exponent=stiffness_exponent,
-                **{**inputs, "k": k},
-            )
-            for k in (interval["k_low"], inputs["k"], interval["k_high"])
-        )
-        return replace(middle, ends=(softest, stiffest))
-    inputs, stiffening = stiffening_of(inputs, unknown, kind, stiffness_exponent)
-    curve = InputCurve(surrogate, fixed_inputs(inputs, unknown, kind), unknown, kind, stiffening)
-    return _solution_over(curve, _levels(target), ends)
+    kind, (name, _) = kind_of(contact, direction), field_of(unknown)
+    within = None if within is None else _ends(unknown, within)
+    inputs, interval = without_interval(case, name)
+    inputs, stiffening = stiffening_of(inputs, name, kind, stiffness_exponent)
+    fixed, levels = fixed_inputs(inputs, unknown, kind), _levels(target)
+    words = {"contact": contact, "direction": direction, "stiffness_exponent": stiffness_exponent}
+
+    def solved(**k: float) -> TableSolution:
+        curve = InputCurve(surrogate, fixed | k, name, kind, stiffening)
+        return _solution_over(curve, unknown, levels, within, {**words, **case})
+
+    middle = solved()
+    if not interval:
+        return middle
+    softest, stiffest = (solved(k=float(np.ravel(k)[0])) for k in interval.values())
+    return replace(middle, ends=(softest, stiffest))
 
 
 def _levels(target: Numbers) -> Array:
@@ -273,17 +232,25 @@ def _levels(target: Numbers) -> Array:
 
 
 def _solution_over(
-    curve: InputCurve, levels: Array, within: tuple[float, float] | None
+    curve: InputCurve,
+    unknown: str,
+    levels: Array,
+    within: tuple[float, float] | None,
+    question: dict[str, Any],
 ) -> TableSolution:
-    """Return the roots of each target on a curve, in a range or in the default range."""
-    unknown = curve.unknown
-    low, high = _default_range(curve, levels) if within is None else _checked_range(curve, within)
-    folds = unknown in ("k", "Fz") and curve.kind.names["direction"] == "across"
+    """Return the roots of each target on a curve, in a range or in the default range, both in the
+    unit of the unknown: omega of the curve may be f here."""
+    per = field_of(unknown)[1]
+    if within is None:
+        low, high = _default_range(curve, levels)
+    else:
+        low, high = _checked_range(curve, per * within[0], per * within[1])
+    folds = curve.unknown in ("k", "Fz") and not curve.kind.direction
     places = samples(low, high, _PER_DECADE if folds else _PER_DECADE_MONOTONE)
     search = Search(curve, np.array([low, *places, high]), low, high, levels)
     found = search.roots()
-    reach = Reach(low, high, *search.extremes)
-    if within is None and unknown in EVERYWHERE and not search.constant:
+    reach = Reach(*(within or (low / per, high / per)), *search.extremes)
+    if within is None and curve.unknown in EVERYWHERE and not search.constant:
         reach = _without_limit(curve, reach)
     targets = tuple(levels.tolist())
     kept = [
@@ -292,35 +259,16 @@ def _solution_over(
     ]
     values = np.array([root.value for of_target in kept for root in of_target])
     regimes = iter(curve.answer(values).regime.tolist() if values.size else [])
-    roots = tuple(tuple(Root(*root[:4], next(regimes)) for root in of_target) for of_target in kept)
-    return TableSolution(
-        unknown,
-        "mu_macro",
-        targets,
-        roots,
-        reach,
-        search.constant,
-        stiffening=curve.stiffening,
-        curve=curve,
-        within=within,
-    )
-
-
-def _in_unit(solution: TableSolution, unknown: str, per: float) -> TableSolution:
-    """Return a solution under another name of the unknown; ``per`` of the field's unit are one of
-    its unit."""
     roots = tuple(
         tuple(
-            root._replace(value=root.value / per, low=root.low / per, high=root.high / per)
+            TableRoot(root.value / per, root.low / per, root.high / per, root.mean, next(regimes))
             for root in of_target
         )
-        for of_target in solution.roots
+        for of_target in kept
     )
-    reach = replace(solution.reach, low=solution.reach.low / per, high=solution.reach.high / per)
-    ends = solution.ends
-    if ends is not None:
-        ends = _in_unit(ends[0], unknown, per), _in_unit(ends[1], unknown, per)
-    return replace(solution, unknown=unknown, roots=roots, reach=reach, ends=ends, within=None)
+    return TableSolution(
+        unknown, "mu_macro", targets, roots, reach, search.constant, curve, question, within
+    )
 
 
 def _ends(unknown: str, within: Any) -> tuple[float, float]:
@@ -341,8 +289,8 @@ def _legal(curve: InputCurve) -> tuple[float, float]:
     return low, math.nextafter(curve.case["Fz"], 0.0) if curve.unknown == AMPLITUDE else high
 
 
-def _checked_range(curve: InputCurve, within: tuple[float, float]) -> tuple[float, float]:
-    low, high = within
+def _checked_range(curve: InputCurve, low: float, high: float) -> tuple[float, float]:
+    """Return a range of the unknown.  Raise InputError if it is not one of legal values."""
     least, most = _legal(curve)
     if not least <= low < high <= most:
         bound = "two ascending, finite numbers " + ("> 0" if curve.unknown in POSITIVE else ">= 0")

@@ -16,7 +16,6 @@ from builder.approximations import approximations, border_speeds
 from mumacro import Surrogate
 from mumacro.cli.main import main
 from mumacro.contacts.stiffening import Stiffening
-from mumacro.questions.borders import border_crossings
 from mumacro.questions.law import law as friction_law
 from mumacro.questions.solve_for import solve_for
 from mumacro.validity import load_notes
@@ -94,7 +93,7 @@ def test_what_is_left_out_is_hertz_for_a_ball_and_constant_for_a_spring(
         assert alone.answer.mu_macro.tolist() == one_k.tolist()
         assert "k" not in alone.columns
     solution = solve_for(surrogate, "Fz", 0.25, contact="ball", **CASE)
-    assert solution.stiffening == Stiffening(1.0 / 3.0, CASE["Fz"])
+    assert solution.curve.stiffening == Stiffening(1.0 / 3.0, CASE["Fz"])
 
 
 def test_an_interval_of_stiffness_grows_as_a_whole(surrogate: Surrogate) -> None:
@@ -268,9 +267,8 @@ def test_a_stiffness_beyond_all_numbers_is_refused(surrogate: Surrogate) -> None
 
 def test_borders_of_proportional_growth_are_none(surrogate: Surrogate) -> None:
     five = without({**CASE, "v0": 0.0710}, "Fz")
-    assert (
-        border_crossings(surrogate, "Fz", five, 1e-3, 1e3, stiffening=Stiffening(1.0, 10.0)) == ()
-    )
+    law = friction_law(surrogate, "Fz", values=[1e-3, 1e3], stiffness_exponent=1.0, **five, Fz=10.0)
+    assert law.border == ()
 
 
 # --- what is said, command line, HTTP -------------------------------------------------------------

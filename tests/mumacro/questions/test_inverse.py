@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from mumacro import Surrogate
-from mumacro.questions.borders import border_crossings
+from mumacro.questions.law import law
 from mumacro.questions.solve_for import solve_for
 from tests.support.cases import CASE, PAIRS, Case, as_kind, every_pair, without
 from tests.support.comparing import close
@@ -336,7 +336,8 @@ def test_the_crossings_are_all_changes_of_the_regime(
         values = values[values > 4.0] if along == "Fz" else values[values < 10.0]
     regime = surrogate.evaluate(**{**case, along: values}, **words).regime
     (changes,) = np.nonzero(regime[1:] != regime[:-1])
-    marks = border_crossings(surrogate, along, without(case, along), values[0], values[-1], **words)
+    ends = values[[0, -1]]
+    marks = law(surrogate, along, values=ends, **without(case, along), **words).border
     assert [mark.regimes for mark in marks] == [(regime[i], regime[i + 1]) for i in changes]
     for mark, i in zip(marks, changes, strict=True):
         assert values[i] < mark.value <= values[i + 1]
@@ -354,7 +355,7 @@ def test_a_ray_at_the_border_crosses_it_twice_or_never(
     closest = 1.290791
     ratio = share * closest / surrogate.v_tilde_crit(closest)  # y~ / v~
     case = {"mu0": 1.0, "Fz": 1.0, "y0": 1.0, "omega": ratio, "v0": 1.0}
-    crossings = border_crossings(surrogate, "k", case, 1e-3, 1e3)
+    crossings = law(surrogate, "k", values=[1e-3, 1e3], **case).border
     assert len(crossings) == expected
     assert all(crossing.value == close(closest, rel=1e-3) for crossing in crossings)
 
@@ -371,9 +372,10 @@ def test_a_fold_just_above_its_first_ratio_is_found(surrogate: Surrogate) -> Non
 
 
 def test_outside_its_range_there_is_no_border(surrogate: Surrogate) -> None:
-    assert border_crossings(surrogate, "v0", without(CASE, "v0"), 1e-12, 1e-3) == ()
-    assert border_crossings(surrogate, "v0", {**without(CASE, "v0"), "k": "rigid"}, 0.0, 1e3) == ()
-    assert border_crossings(surrogate, "k", {**without(CASE, "k"), "v0": 0.0}, 1e-3, 1e3) == ()
+    five = without(CASE, "v0")
+    assert law(surrogate, "v0", values=[1e-12, 1e-3], **five).border == ()
+    assert law(surrogate, "v0", values=[0.0, 1e3], **{**five, "k": "rigid"}).border == ()
+    assert law(surrogate, "k", values=[1e-3, 1e3], **{**without(CASE, "k"), "v0": 0.0}).border == ()
 
 
 def test_an_interval_of_k_is_solved_for_at_both_ends(surrogate: Surrogate) -> None:

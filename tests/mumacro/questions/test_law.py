@@ -51,7 +51,6 @@ def test_a_range_has_its_ends_exactly(scale: Any) -> None:
 @pytest.mark.parametrize(
     ("field", "arguments"),
     [
-        ("along", ("x", 1.0, 2.0, 5, "log")),
         ("scale", ("v0", 1.0, 2.0, 5, "cubic")),
         ("points", ("v0", 1.0, 2.0, 1, "log")),
         ("start", ("v0", 0.0, 2.0, 5, "log")),
