@@ -10,18 +10,18 @@ import math
 import os
 import re
 import sys
-from argparse import RawDescriptionHelpFormatter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
 from mumacro import plotting
 from mumacro.errors import InputError, MumacroError
-from mumacro.inputs.case import NO_DEVIATION, read, read_one
-from mumacro.inputs.cases import A_DEVIATION, EXACT, KIND, check, without_interval
+from mumacro.inputs.case import NO_DEVIATION, Value, read, read_one
+from mumacro.inputs.cases import A_DEVIATION, EXACT, KIND, check
 from mumacro.inputs.fields import (
     AMPLITUDE,
     CONTACTS,
@@ -32,13 +32,13 @@ from mumacro.inputs.fields import (
     SPRING,
     Kind,
     in_help,
-    kind_of,
 )
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.numbers import check_signs
 from mumacro.inputs.units import belongs_to_value, choose_unit, format_number, tidy_zeros, unit_of
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import names_in
+from mumacro.questions.solutions import Solution
 from mumacro.results import Note, listed
 from mumacro.surrogate import Surrogate
 
@@ -63,18 +63,15 @@ class ImpossibleError(MumacroError):
     """Report a valid request that has no result, in one line with the reason."""
 
 
-class _Lines(RawDescriptionHelpFormatter):
-    """Format the help in 100 columns, one option per line, so that most of it fits a screen."""
-
-    def __init__(self, prog: str) -> None:
-        super().__init__(prog, max_help_position=34, width=100)
+#: the help in 100 columns, one option per line, so that most of it fits a screen
+_LINES = partial(argparse.RawDescriptionHelpFormatter, max_help_position=34, width=100)
 
 
 class OneLineParser(argparse.ArgumentParser):
     """Parse arguments; report a fault in one line."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__(formatter_class=_Lines, allow_abbrev=False, **options)
+        super().__init__(formatter_class=_LINES, allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
         """End the program with code 2 and the fault.  Add the choice that was probably meant, or
@@ -106,19 +103,15 @@ def question(
     words: str,
     least: str = "+",
     first: tuple[str, dict[str, Any]] | None = None,
+    names_of_out: Sequence[str] = (),
 ) -> OneLineParser:
-    """Return the parser of a command that takes a case and ``-o``; ``first`` is an argument before
-    the case."""
+    """Return the parser of a command that takes a case and ``-o``, which may have more names;
+    ``first`` is an argument before the case."""
     parser = OneLineParser(prog=f"mumacro {name}", description=description, epilog=epilog)
     if first:
         parser.add_argument(first[0], **first[1])
     add_case(parser, words, least)
-    parser.add_argument(
-        "-o",
-        "--out",
-        type=Path,
-        help="write the result there: a picture, .png, .svg or .pdf, or .csv",
-    )
+    add_out(parser, *names_of_out)
     return parser
 
 
@@ -130,10 +123,20 @@ def add_case(parser: OneLineParser, words: str, least: str = "+") -> None:
     add_table(parser)
 
 
-def add_kind(parser: argparse.ArgumentParser) -> None:
-    """Add the options for the contact and the direction of its oscillation; :func:`kind_in` reads
-    them."""
+def add_contact(parser: argparse.ArgumentParser) -> None:
+    """Add the option for the contact."""
     parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
+
+
+def add_out(parser: argparse.ArgumentParser, *names: str) -> None:
+    """Add the option for a file with the result, with more ``names`` than ``-o`` and ``--out``."""
+    text = "write the result there: a picture, .png, .svg or .pdf, or .csv"
+    parser.add_argument("-o", "--out", *names, type=Path, metavar="OUT", help=text)
+
+
+def add_kind(parser: argparse.ArgumentParser) -> None:
+    """Add the options for the contact and the direction of its oscillation."""
+    add_contact(parser)
     text = f"{', '.join(DIRECTIONS)} (of the normal force); default: across"
     parser.add_argument(
         "--direction", choices=DIRECTIONS, default="across", metavar="NAME", help=text
@@ -149,12 +152,6 @@ def add_include(parser: argparse.ArgumentParser) -> None:
 def included(options: argparse.Namespace) -> tuple[str, ...]:
     """Return the outputs that ``--include`` names.  Raise InputError for an unknown one."""
     return tuple(name for text in options.include for name in names_in(text))
-
-
-def kind_in(options: argparse.Namespace) -> Kind:
-    """Return the contact and the direction from the options.  Raise InputError for a ball whose
-    normal force oscillates."""
-    return kind_of(options.contact, options.direction)
 
 
 def add_table(parser: OneLineParser) -> None:
@@ -211,31 +208,37 @@ def run(title: str, command: Callable[[Any], int | str], arguments: Any) -> int:
 # --- what a person writes -------------------------------------------------------------------------
 
 
+class TypedCase(NamedTuple):
+    """Hold a case as a person typed it."""
+
+    inputs: dict[str, Any]  #: in SI, as keywords of ``Surrogate.evaluate``
+    units: dict[str, str]  #: the units that were typed, by input
+
+
 def read_case(
     words: Sequence[str],
     kind: Kind = SPRING,
     without: Sequence[str] = (),
     *,
     one_k: str = "",
-    whole: bool = True,
     optional: Sequence[str] = (),
     deviations: bool = False,
-) -> dict[str, Any]:
-    """Return the inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``, in SI, as keywords of
-    ``Surrogate.evaluate``.
+) -> TypedCase:
+    """Return the inputs from arguments such as ``mu0=0.3 Fz=10 y0=2um``.
 
     ``without`` are unknown or swept inputs, which must not be there.  ``one_k`` says why ``k`` must
-    not be an interval here; if it is empty, an interval becomes ``k_low`` and ``k_high``.  If
-    ``whole``, all other inputs must be there, except those in ``optional``.  With ``deviations`` a
-    typed one, as in ``k=1±0.1N/um``, becomes ``std_k`` and so on.  UsageError lists all faults in
-    one line.
+    not be an interval here; if it is empty, an interval becomes ``k_low`` and ``k_high``.  All
+    other inputs must be there, except those in ``optional``.  With ``deviations`` a typed one, as
+    in ``k=1±0.1N/um``, becomes ``std_k`` and so on.  UsageError lists all faults in one line.
 
-    >>> read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20kHz v0=0.01"])["k"]
-    1000000.0
+    >>> case = read_case(["mu0=0.3 Fz=10", "k=1 N/um", "y0=2um f=20kHz v0=0.01"])
+    >>> case.inputs["k"], case.units
+    (1000000.0, {'k': 'N/um', 'y0': 'um', 'f': 'kHz'})
     """
     allowed = [*kind.columns, *([] if one_k else ENDS)]
     allowed += [f"std_{name}" for name in kind.columns] if deviations else []
     case: dict[str, float] = {}
+    units: dict[str, str] = {}
     faults: list[str] = []
     no_pairs: list[str] = []
     for name, text in _pairs(words):
@@ -248,7 +251,9 @@ def read_case(
             faults.append(_unknown(name, text, similar, kind))
             continue
         try:
-            values = _read(name, text, one_k, deviations)
+            value = read(name.removeprefix("std_"), text)
+            values = _inputs_of(name, text, value, one_k, deviations)
+            units |= _unit(name, value)
         except InputError as error:
             faults.append(str(error))
             values = {name: math.nan}
@@ -262,18 +267,19 @@ def read_case(
     except InputError as error:
         faults.append(str(error))
     absent = {*optional} - case.keys()
-    faults += _faults_of_names(case, kind, [*without, *absent], whole)
+    faults += _faults_of_names(case, kind, [*without, *absent])
     if faults:
         raise UsageError("; ".join(faults))
-    return case
+    return TypedCase(case, units)
 
 
-def _read(name: str, text: str, one_k: str, deviations: bool) -> dict[str, float]:
-    """Return what a text says about an input: its value, with its deviation, or both ends of k.
+def _inputs_of(
+    name: str, text: str, value: Value, one_k: str, deviations: bool
+) -> dict[str, float]:
+    """Return what a value says about an input: the number, with its deviation, or both ends of k.
 
-    Raise InputError if the text is not a value, or the value is out of bounds.
+    Raise InputError if it is out of bounds, or has what is not allowed here.
     """
-    value = read(name.removeprefix("std_"), text)
     if name.startswith("std_"):
         if value.std is not None or value.low is not None:
             raise InputError(name, text, A_DEVIATION)
@@ -331,9 +337,12 @@ def _is_name(word: str) -> bool:
     return not belongs_to_value(word) and suggestion(word, loosely=False) is not None
 
 
-def _faults_of_names(
-    case: Mapping[str, Any], kind: Kind, without: Sequence[str], whole: bool
-) -> list[str]:
+def _unit(name: str, value: Value) -> dict[str, str]:
+    """Return the unit of a value by the name of its input; nothing for a bare number."""
+    return {} if name not in INPUTS or value.unit in (None, "", "1", "-") else {name: value.unit}
+
+
+def _faults_of_names(case: Mapping[str, Any], kind: Kind, without: Sequence[str]) -> list[str]:
     frequencies = {"f", "omega"}
     unknowns = {*without} | (frequencies if frequencies & {*without} else set())
     faults = [
@@ -349,18 +358,27 @@ def _faults_of_names(
     absent = [
         hints.get(name, f"{name} [{unit_of(name)}]") for name in kind.fields if name not in complete
     ]
-    return faults + (["missing: " + ", ".join(absent)] if absent and whole else [])
+    return faults + (["missing: " + ", ".join(absent)] if absent else [])
 
 
-def other_meaning(
-    target: float, is_ratio: bool, case: Mapping[str, Any], holds: Callable[[float], bool]
-) -> str:
+def target_in(options: argparse.Namespace, case: Mapping[str, Any]) -> float:
+    """Return the mu_macro of ``--target``, which with ``--ratio`` is over mu0."""
+    if not options.ratio:
+        return float(options.target)
+    if "mu0" not in case:
+        raise UsageError("--ratio cannot be used with mu0 as the unknown: give --target alone")
+    return float(options.target * case["mu0"])
+
+
+def other_meaning(options: argparse.Namespace, case: TypedCase, solution: Solution) -> str:
     """Return the option that was perhaps forgotten or unnecessary, if a target is out of reach: it
-    may be mu_macro, or its ratio to mu0.  ``holds`` tells whether a mu_macro is in reach."""
-    mu0 = case.get("mu0")
-    if not mu0 or not holds(target if is_ratio else target * mu0):
+    may be mu_macro, or its ratio to mu0."""
+    target, mu0 = options.target, case.inputs.get("mu0")
+    if solution.constant or not mu0:
         return ""
-    if is_ratio:
+    if not solution.reach.holds(target if options.ratio else target * mu0):
+        return ""
+    if options.ratio:
         return f"; did you mean mu_macro = {target:g}? Then leave out --ratio"
     return f"; did you mean mu_macro/mu0 = {target:g}? Then add --ratio"
 
@@ -371,34 +389,19 @@ def without_or_load(unknown: str) -> dict[str, Any]:
     return {"optional": ["Fz"]} if unknown == "Fz" else {"without": [unknown]}
 
 
-def middle_of(case: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a case in which the geometric middle replaces an interval of k."""
-    one_k, _ = without_interval(case)
-    return {name: float(x) if isinstance(x, np.ndarray) else x for name, x in one_k.items()}
+def unit_of_ends(name: str, texts: Iterable[str]) -> dict[str, str]:
+    """Return the unit of the first of several texts of an input that has one, by its name.
 
-
-def typed_units(words: Sequence[str], **texts_of: Sequence[str]) -> dict[str, str]:
-    """Return the units that were typed, by input.  ``texts_of`` has more texts of an input, such as
-    the ends of a range; they come first.
-
-    >>> typed_units(["mu0=0.3 Fz=10N", "k=1 N/um v0=1mm/s"], v0=["0.1m/s", "1"])
-    {'v0': 'm/s', 'Fz': 'N', 'k': 'N/um'}
+    >>> unit_of_ends("v0", ["0.1m/s", "1"]), unit_of_ends("v0", ["1"])
+    ({'v0': 'm/s'}, {})
     """
-    pairs = [(name, text) for name, texts in texts_of.items() for text in texts]
-    pairs += [(name, text) for name, text in _pairs(words) if text is not None]
-    units: dict[str, str] = {}
-    for name, text in pairs:
-        if name in INPUTS and (unit := read(name, text).unit) not in (None, "", "1", "-"):
-            units.setdefault(name, str(unit))
-    return units
+    return next(filter(None, (_unit(name, read(name, text)) for text in texts)), {})
 
 
-def case_line(
-    case: Mapping[str, Any], units: Mapping[str, str], kind: Kind, *oscillations: str
-) -> str:
+def case_line(typed: TypedCase, kind: Kind, *oscillations: str) -> str:
     """Return the case as the program understood it, in the units that were typed, and its
     ``oscillations``."""
-    parts = []
+    (case, units), parts = typed, list[str]()
     for name, value in case.items():
         if name.startswith("std_") or name == ENDS[1]:
             continue
@@ -456,11 +459,6 @@ def open_table(table: str | None) -> Surrogate:
 # --- results --------------------------------------------------------------------------------------
 
 
-def table_members(surrogate: Surrogate) -> dict[str, Any]:
-    """Return the members that identify a table in JSON."""
-    return {"id": surrogate.id, "tolerance": surrogate.tolerance}
-
-
 def in_columns(rows: Iterable[Sequence[str]]) -> str:
     """Return rows of cells as text in columns."""
     columns = list(zip_longest(*rows, fillvalue=""))
@@ -474,14 +472,29 @@ def in_columns(rows: Iterable[Sequence[str]]) -> str:
 
 def note_lines(notes: Iterable[Note]) -> list[str]:
     """Return the lines below a result."""
-    return [in_columns([(note.word, note.about)]) for note in notes]
+    return [f"{note.word}  {note.about}" for note in notes]
+
+
+def answer(
+    options: argparse.Namespace,
+    result: Any,
+    columns: Mapping[str, Any],
+    text: str,
+    surrogate: Surrogate | None = None,
+    **panels: Any,
+) -> str:
+    """Return a result as the options ask for it, as JSON or as ``text``, after a line that names
+    the file of ``-o`` with its picture or its columns."""
+    written = ""
+    if options.out is not None:
+        written = write_result(options.out, columns, result.plot, **panels)
+    if options.json:
+        return as_json(result.to_dict(), surrogate)
+    return "\n".join(filter(None, (written, text)))
 
 
 def write_result(
-    path: Path,
-    columns: Mapping[str, Any],
-    draw: Callable[[Any], Any],
-    **panels: Any,
+    path: Path, columns: Mapping[str, Any], draw: Callable[[Any], Any], **panels: Any
 ) -> str:
     """Write ``-o``: x.csv with the columns under their headers, with all digits; or a picture.
     Return a line that names the file."""
@@ -497,6 +510,12 @@ def write_result(
     return f"written: {path}"
 
 
-def as_json(value: object) -> str:
-    """Return JSON in which a number that is not finite is null."""
-    return json.dumps(listed(value), indent=2)
+def as_json(value: Mapping[str, Any], surrogate: Surrogate | None = None) -> str:
+    """Return JSON in which a number that is not finite is null, with the table that answered."""
+    table = {} if surrogate is None else {"table": members_of(surrogate)}
+    return json.dumps(listed({**value, **table}), indent=2)
+
+
+def members_of(surrogate: Surrogate) -> dict[str, Any]:
+    """Return the members that identify a table in JSON."""
+    return {"id": surrogate.id, "tolerance": surrogate.tolerance}

@@ -2,21 +2,18 @@
 file."""
 
 import argparse
-import sys
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
+from functools import partial
 
 from mumacro import plotting
 from mumacro.cli import common
-from mumacro.cli.common import ImpossibleError, OneLineParser, UsageError, as_json, in_columns
-from mumacro.cli.table_format import add_format, dialect_in
-from mumacro.errors import InputError, TextError
+from mumacro.cli.common import OneLineParser, UsageError, in_columns
+from mumacro.cli.table_format import add_format, dialect_in, fit_to, read_table
+from mumacro.errors import InputError
 from mumacro.fits.loop import fit_loop
 from mumacro.fits.loop_fitted import LoopFit
 from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.case import read_one
-from mumacro.inputs.fields import CONTACTS
 from mumacro.inputs.text_tables import read_numbers
 
 EXAMPLE = "mumacro fit-loop loop.csv Fz=10N --displacement x --force Ft -o loop.png"
@@ -53,10 +50,8 @@ def _parser() -> OneLineParser:
     parser.add_argument("--load", metavar="COLUMN", help="of the normal force, in place of Fz=")
     text = "the first and the last cycle; default: all samples"
     parser.add_argument("--cycles", type=_cycles, metavar="A..B", help=text)
-    parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
-    text = "write the result there: a picture, .png, .svg or .pdf, or .csv"
-    parser.add_argument("-o", "--out", type=Path, help=text)
-    parser.add_argument("--plot", dest="out", type=Path, metavar="FILE", help="the same as --out")
+    common.add_contact(parser)
+    common.add_out(parser, "--plot")
     parser.add_argument("--json", action="store_true", help="print JSON, with all digits")
     add_format(parser)
     return parser
@@ -73,47 +68,28 @@ def run(words: Sequence[str]) -> str:
     load = _load(options.words, options.load)
     input_of = {name: "y0" if what == "displacement" else "Fz" for what, name in names.items()}
     column_names = ColumnNames(input_of, [(name,) for name in names.values()])
-    source = sys.stdin.buffer.read() if options.loop == "-" else Path(options.loop)
-    try:
-        table = read_numbers(source, column_names, dialect_in(options))
-    except TextError as error:
-        raise ImpossibleError(f"{options.loop}: {error}") from None
-    columns = {what: table.columns[name] for what, name in names.items()}
-    if load is not None:
-        columns["Fz"] = load
-    try:
-        found = fit_loop(**columns, contact=options.contact, cycles=options.cycles)
-    except InputError as error:
-        at_line = f"line {table.lines[error.index]}: " if error.index is not None else ""
-        name = names.get(error.field, error.field)
-        fault = InputError(name, error.value, error.bound)
-        raise ImpossibleError(f"{options.loop}: {at_line}{fault}") from None
-    except ModuleNotFoundError as error:  # it says what to install
-        raise ImpossibleError(str(error)) from None
-    if table.read_as:
-        print(f"mumacro fit-loop: read as: {table.read_as}", file=sys.stderr)
-    report = ""
-    if options.out is not None:
-        heads = ("displacement [m]", "force [N]", "Fz [N]", "force fitted [N]")
-        columns = dict(zip(heads, found.loop.values(), strict=True))
-        report = common.write_result(options.out, columns, found.plot, **plotting.OF_FIT)
-    if options.json:
-        return as_json(found.to_dict())
-    return "\n".join(filter(None, [report, _text(found)]))
+    dialect = dialect_in(options)
+    table = read_table(options.loop, lambda source: read_numbers(source, column_names, dialect))
+    columns = {what: table.columns[name] for what, name in names.items()} | load
+    fit = partial(fit_loop, **columns, contact=options.contact, cycles=options.cycles)
+    found = fit_to("fit-loop", options.loop, table, fit, names)
+    heads = ("displacement [m]", "force [N]", "Fz [N]", "force fitted [N]")
+    in_si = dict(zip(heads, found.loop.values(), strict=True))
+    return common.answer(options, found, in_si, _text(found), **plotting.OF_FIT)
 
 
-def _load(words: Sequence[str], column: str | None) -> Any:
-    """Return the normal force that was typed [N], or None if it is a column."""
+def _load(words: Sequence[str], column: str | None) -> dict[str, float]:
+    """Return the normal force that was typed [N], or nothing if it is a column."""
     text = " ".join(words)
     name, equals, value = text.partition("=")
     if column is not None:
         if text:
             raise UsageError(f"{text}: --load {column} is the normal force")
-        return None
+        return {}
     if name.strip() != "Fz" or not equals:
         raise UsageError(f"{text or 'Fz'}: give the normal force alone, as Fz=10N or --load COLUMN")
     try:
-        return read_one("Fz", value.strip())
+        return {"Fz": read_one("Fz", value.strip())}
     except InputError as error:
         raise UsageError(str(error)) from None
 

@@ -9,12 +9,12 @@ from mumacro.cli.common import (
     CURVE,
     OneLineParser,
     UsageError,
-    as_json,
     in_columns,
     open_table,
     read_case,
 )
 from mumacro.inputs.case import read_one
+from mumacro.inputs.fields import kind_of
 from mumacro.inputs.units import (
     Unit,
     choose_unit,
@@ -50,7 +50,7 @@ def _parser() -> OneLineParser:
 def run(words: Sequence[str]) -> str:
     """Run ``mumacro law``."""
     options = _parser().parse_intermixed_args(words)
-    (along, *ends), kind = options.along, common.kind_in(options)
+    (along, *ends), kind = options.along, kind_of(options.contact, options.direction)
     if along not in kind.columns:
         raise UsageError(f"--along {along}: the swept input is one of {', '.join(kind.columns)}")
     case = read_case(options.words, kind, deviations=True, **common.without_or_load(along))
@@ -67,14 +67,12 @@ def run(words: Sequence[str]) -> str:
         refine=is_picture,
         stiffness_exponent=options.stiffness_exponent,
         **kind.names,
-        **case,
+        **case.inputs,
     )
     columns = law.columns
-    if options.json:
-        return as_json({**law.to_dict(), "table": common.table_members(surrogate)})
     middle = float(law.values[law.values.size // 2])
     count = law.digits if options.digits is None else options.digits
-    units = common.typed_units(options.words, **{along: ends})
+    units = case.units | common.unit_of_ends(along, ends)
     unit = choose_unit(along, middle, units, options.digits)
     of_k = ", for the geometric middle of k" if law.k_ends else ""
     notes = [
@@ -82,15 +80,16 @@ def run(words: Sequence[str]) -> str:
         for c in law.border
     ]
     notes += common.note_lines(law.notes)
-    if options.out is not None:
-        heads = [f"{name} [{unit_of(name)}]" if name in (along, "k") else name for name in columns]
-        in_si = dict(zip(heads, columns.values(), strict=True))
-        return "\n".join([common.write_result(options.out, in_si, law.plot), *notes])
+    heads = [f"{name} [{unit_of(name)}]" if name in (along, "k") else name for name in columns]
     column_units = {along: unit}
     if law.stiffening is not None:
         column_units["k"] = choose_unit("k", float(law.inputs["k"].max()), units, options.digits)
-    table = _table(columns, column_units, count, options.digits)
-    return "\n".join([common.case_line(case, units, kind), table, *notes])
+    lines = notes
+    if options.out is None:
+        table = _table(columns, column_units, count, options.digits)
+        lines = [common.case_line(case, kind), table, *notes]
+    in_si = dict(zip(heads, columns.values(), strict=True))
+    return common.answer(options, law, in_si, "\n".join(lines), surrogate)
 
 
 def _table(

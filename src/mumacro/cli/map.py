@@ -7,6 +7,7 @@ import numpy as np
 from mumacro import plotting
 from mumacro.cli import common
 from mumacro.cli.common import UsageError, open_table, read_case
+from mumacro.inputs.fields import kind_of
 
 
 def run(words: Sequence[str]) -> str:
@@ -20,10 +21,10 @@ def run(words: Sequence[str]) -> str:
     options = parser.parse_intermixed_args(words)
     if options.out is None:
         raise UsageError("a map is written to a file: give -o map.png")
-    kind, surrogate = common.kind_in(options), open_table(options.table)
+    kind, surrogate = kind_of(options.contact, options.direction), open_table(options.table)
     answer = None
     if options.words:
-        answer = surrogate.evaluate(read_case(options.words, kind), **kind.names)
+        answer = surrogate.evaluate(read_case(options.words, kind).inputs, **kind.names)
     grid = np.meshgrid(plotting.speeds(141), plotting.amplitudes(101, kind.normal))
     v, y = (x.ravel() for x in grid)
     ranges = ((v[0], v[-1]), (y[0], y[-1]))

@@ -2,13 +2,12 @@
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from mumacro import plotting
 from mumacro.cli import common
-from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns, read_case
-from mumacro.inputs.fields import CONTACTS, in_help, kind_of
+from mumacro.cli.common import OneLineParser, TypedCase, UsageError, in_columns, read_case
+from mumacro.inputs.fields import in_help, kind_of
 from mumacro.inputs.units import Unit, format_number, suit_unit
 from mumacro.motions.motion import NUMBERS, PARTS, Motion
 from mumacro.motions.motion import motion as steady_cycle
@@ -40,21 +39,20 @@ def add_parts(parser: argparse.ArgumentParser) -> None:
 
 def read_motion(
     options: argparse.Namespace, optional: Sequence[str] = ()
-) -> tuple[dict[str, Any], dict[str, Any], str]:
-    """Return the case and the oscillations that were typed, as keywords of :func:`mumacro.motion`,
-    and a line that says how the program understood both.
+) -> tuple[TypedCase, dict[str, Any], str]:
+    """Return the case that was typed, the oscillations as keywords of :func:`mumacro.motion`, and a
+    line that says how the program understood both.
 
     ``optional`` are inputs of the case that may be left out.
     """
     why = "one motion has one k; ask for both ends"
     case = read_case(options.words, one_k=why, optional=["y0", *optional])
-    if "y0" in case:
+    if "y0" in case.inputs:
         raise UsageError("y0 is an option here: --y for across, --x for along the drag")
     texts = {name: text for name in PARTS if (text := getattr(options, name)) is not None}
     parts = dict(zip(texts, common.read_values(texts.items(), read_oscillation), strict=True))
     oscillations = [f"{name} = {text}" for name, text in texts.items()]
-    units, kind = common.typed_units(options.words), kind_of(options.contact)
-    line = common.case_line(case, units, kind, *oscillations)
+    line = common.case_line(case, kind_of(options.contact), *oscillations)
     return case, parts, line.removesuffix(", across")
 
 
@@ -68,11 +66,10 @@ def _parser() -> OneLineParser:
     )
     parser.add_argument("words", nargs="+", metavar="name=value", help="a case without y0")
     add_parts(parser)
-    parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
+    common.add_contact(parser)
     text = "of the mean force over mu0 Fz, 1e-9 to 1e-2; default: 1e-6"
     parser.add_argument("--tolerance", type=common.number_of("tolerance"), default=1e-6, help=text)
-    text = "write the cycle there: a picture, .png, .svg or .pdf, or .csv"
-    parser.add_argument("-o", "--out", type=Path, help=text)
+    common.add_out(parser)
     common.add_form(parser)
     return parser
 
@@ -81,25 +78,20 @@ def run(words: Sequence[str]) -> str:
     """Run ``mumacro motion``."""
     options = _parser().parse_intermixed_args(words)
     case, parts, line = read_motion(options)
-    motion = steady_cycle(**case, **parts, contact=options.contact, tolerance=options.tolerance)
-    if options.json:
-        lines = as_json(motion.to_dict())
-    else:
-        rows = [
-            (name, *_shown(name, getattr(motion, name), unit, motion, options.digits), meaning)
-            for name, (unit, meaning) in NUMBERS.items()
-            if name != "error_estimate"
-        ]
-        error = f"numerical error of both about {motion.error_estimate:.1e}"
-        notes = [note.line for note in motion.notes]
-        lines = "\n".join([line, in_columns(rows), error, *notes])
-    if options.out is None:
-        return lines
+    motion = steady_cycle(
+        **case.inputs, **parts, contact=options.contact, tolerance=options.tolerance
+    )
+    rows = [
+        (name, *_shown(name, getattr(motion, name), unit, motion, options.digits), meaning)
+        for name, (unit, meaning) in NUMBERS.items()
+        if name != "error_estimate"
+    ]
+    error = f"numerical error of both about {motion.error_estimate:.1e}"
+    text = "\n".join([line, in_columns(rows), error, *(note.line for note in motion.notes)])
     columns = {}
-    if options.out.suffix == ".csv":
+    if options.out is not None and options.out.suffix == ".csv":
         columns = {f"{name} [{_SI[name]}]": x for name, x in motion.cycle()._asdict().items()}
-    report = common.write_result(options.out, columns, motion.plot, **plotting.OF_CYCLE)
-    return lines if options.json else f"{lines}\n{report}"
+    return common.answer(options, motion, columns, text, **plotting.OF_CYCLE)
 
 
 def _shown(

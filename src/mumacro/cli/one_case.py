@@ -1,11 +1,11 @@
 """Run ``mumacro "mu0=0.3 Fz=10N ..."``: print the friction of one case."""
 
-import argparse
 from collections.abc import Sequence
 from typing import Any
 
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, as_json, in_columns, open_table, read_case
+from mumacro.inputs.fields import kind_of
 from mumacro.validity import rows_of
 from mumacro.version import __version__
 from mumacro.words import of_one_case as words_of_one_case
@@ -19,22 +19,18 @@ def run(words: Sequence[str], description: str) -> str:
     parser = OneLineParser(prog="mumacro", description=description + common.ABOUT_INPUTS)
     common.add_case(parser, "the six inputs, quoted together or apart")
     common.add_include(parser)
-    parser.add_argument("--gradient", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument(
         "--model", action="store_true", help="in JSON, too: what the model leaves out in this case"
     )
     parser.add_argument("--version", action="version", version=f"mumacro {__version__}")
-    arguments = parser.parse_intermixed_args(words)
-    kind = common.kind_in(arguments)
-    case = read_case(arguments.words, kind, deviations=True)
-    surrogate = open_table(arguments.table)
-    include = (*common.included(arguments), *(["gradient"] if arguments.gradient else []))
-    options: dict[str, Any] = {**kind.names, "include": include}
-    answer: Any = surrogate.evaluate(case, **options)
-    if arguments.json:
-        said = {"model": rows_of(answer)} if arguments.model else {}
-        return as_json({**answer.to_dict(), **said, "table": common.table_members(surrogate)})
-    units = common.typed_units(arguments.words)
-    rows, notes, error = words_of_one_case(answer, arguments.digits, units)
-    line = common.case_line(case, units, kind)
+    options = parser.parse_intermixed_args(words)
+    kind = kind_of(options.contact, options.direction)
+    case = read_case(options.words, kind, deviations=True)
+    surrogate, asked = open_table(options.table), common.included(options)
+    answer: Any = surrogate.evaluate(case.inputs, **kind.names, include=asked)
+    if options.json:
+        model = {"model": rows_of(answer)} if options.model else {}
+        return as_json({**answer.to_dict(), **model}, surrogate)
+    rows, notes, error = words_of_one_case(answer, options.digits, case.units)
+    line = common.case_line(case, kind)
     return "\n".join([line, in_columns(rows), *([in_columns(notes)] if notes else []), error])

@@ -2,7 +2,7 @@
 
 import argparse
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from mumacro.cli import common, motion, solve_motion
@@ -10,14 +10,13 @@ from mumacro.cli.common import (
     ImpossibleError,
     OneLineParser,
     UsageError,
-    as_json,
     in_columns,
     number_of,
     open_table,
     read_case,
 )
 from mumacro.inputs.case import read_one
-from mumacro.inputs.fields import AMPLITUDE, ENDS, NAMES
+from mumacro.inputs.fields import AMPLITUDE, ENDS, NAMES, kind_of
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.units import Unit, choose_unit, format_number, tidy_zeros
 from mumacro.motions.solve_motion import UNKNOWNS
@@ -79,19 +78,17 @@ def run(words: Sequence[str]) -> str:
     """Run ``mumacro solve-for``."""
     options = _parser().parse_intermixed_args(words)
     if solve_motion.is_motion(options):
-        return solve_motion.run(options, options.between)
-    unknown, kind = options.unknown, common.kind_in(options)
+        return solve_motion.run(options)
+    unknown, kind = options.unknown, kind_of(options.contact, options.direction)
     if unknown not in kind.columns:
         raise UsageError(
             f"{unknown} does not belong to --direction {options.direction}: "
             f"{', '.join(kind.columns)} do"
         )
     case = read_case(options.words, kind, **common.without_or_load(unknown))
-    if options.ratio and unknown == "mu0":
-        raise UsageError("--ratio cannot be used with mu0 as the unknown: give --target alone")
-    target = options.target * case["mu0"] if options.ratio else options.target
-    between = [(unknown, text) for text in options.between or ()]
-    ends = common.read_values(between, read_one)
+    target = common.target_in(options, case.inputs)
+    between = options.between or ()
+    ends = common.read_values([(unknown, text) for text in between], read_one)
     surrogate = open_table(options.table)
     solution = solve_for(
         surrogate,
@@ -100,43 +97,33 @@ def run(words: Sequence[str]) -> str:
         within=(ends[0], ends[1]) if ends else None,
         stiffness_exponent=options.stiffness_exponent,
         **kind.names,
-        **case,
+        **case.inputs,
     )
-    solutions = _solutions_by_k(solution, case)
+    # for an interval of k with the solutions of its ends, by k [N/m], ascending
+    solutions: dict[Any, TableSolution] = {solution.curve.case.get("k"): solution}
+    if solution.ends:
+        low, high = (case.inputs[name] for name in ENDS)
+        solutions = {low: solution.ends[0], **solutions, high: solution.ends[1]}
     rows = [(k, root) for k, one in solutions.items() for root in one.roots[0]]
     if not rows:
-        raise ImpossibleError(solution.reason() + _hint(options, case, solution))
-    if options.json:
-        return as_json({**solution.to_dict(), "table": common.table_members(surrogate)})
-    if options.out is not None:
-        heads = _heads(f"{unknown} [{solution.unit}]", "k [N/m]" if solution.ends else None)
-        in_si = [(*((k,) if solution.ends else ()), *root) for k, root in rows]
-        columns = dict(zip(heads, zip(*in_si, strict=True), strict=True))
-        return common.write_result(options.out, columns, solution.plot)
-    units = common.typed_units(options.words, **{unknown: options.between or ()})
-    first_root = rows[0][1].value
+        raise ImpossibleError(solution.reason() + common.other_meaning(options, case, solution))
     count = solution.digits if options.digits is None else options.digits
-    unit = choose_unit(unknown, first_root, units, options.digits)
+    units = case.units | common.unit_of_ends(unknown, between)
+    unit = choose_unit(unknown, rows[0][1].value, units, options.digits)
     k_unit = choose_unit("k", rows[-1][0], units, options.digits) if solution.ends else None
-    table = _table(unknown, rows, unit, k_unit, count, options.digits)
     without = [
         f"no {unknown} gives that for k = {k:.6g} N/m"
         for k, one in solutions.items()
         if not one.roots[0]
     ]
     ranges = [solution.reason()] if solution.roots[0] and solution.reason() else []
-    line = common.case_line(case, units, kind)
-    return "\n".join([line, table, *ranges, *without, *common.note_lines(solution.notes)])
-
-
-def _solutions_by_k(solution: TableSolution, case: Mapping[str, Any]) -> dict[Any, TableSolution]:
-    """Return the solution, and for an interval of k also the solutions of its ends, by k [N/m],
-    ascending."""
-    middle = common.middle_of(case).get("k")
-    if solution.ends is None:
-        return {middle: solution}
-    low, high = (case[name] for name in ENDS)
-    return {low: solution.ends[0], middle: solution, high: solution.ends[1]}
+    table = _table(unknown, rows, unit, k_unit, count, options.digits)
+    notes = common.note_lines(solution.notes)
+    text = "\n".join([common.case_line(case, kind), table, *ranges, *without, *notes])
+    heads = _heads(f"{unknown} [{solution.unit}]", "k [N/m]" if solution.ends else None)
+    in_si = [(*((k,) if solution.ends else ()), *root) for k, root in rows]
+    columns = dict(zip(heads, zip(*in_si, strict=True), strict=True))
+    return common.answer(options, solution, columns, text if options.out is None else "", surrogate)
 
 
 def _heads(unknown: str, k: str | None) -> list[str]:
@@ -160,10 +147,3 @@ def _table(
         values = [format_number(x, unit, count, digits) for x in (root.value, root.low, root.high)]
         table.append([*of_k, *values, f"{root.mu_macro:.{count}g}", root.regime])
     return in_columns(table)
-
-
-def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: TableSolution) -> str:
-    """Return what was perhaps meant if a target is out of reach."""
-    if solution.constant:
-        return ""
-    return common.other_meaning(options.target, options.ratio, case, solution.reach.holds)

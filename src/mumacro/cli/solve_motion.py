@@ -2,15 +2,14 @@
 give a wanted mean friction."""
 
 import argparse
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from mumacro.cli import common
-from mumacro.cli.common import ImpossibleError, UsageError, as_json, in_columns
+from mumacro.cli.common import ImpossibleError, UsageError, in_columns
 from mumacro.cli.motion import read_motion
 from mumacro.inputs.case import read
 from mumacro.inputs.fields import quantity_of
-from mumacro.inputs.units import Unit, format_number, known, parse_unit, suit_unit, tidy_zeros
+from mumacro.inputs.units import Unit, format_number, parse_unit, suit_unit, tidy_zeros
 from mumacro.motions.motion import PARTS
 from mumacro.motions.solve_motion import MotionSolution, solve_motion
 
@@ -22,50 +21,37 @@ def is_motion(options: argparse.Namespace) -> bool:
     return "." in options.unknown or any(getattr(options, name) is not None for name in PARTS)
 
 
-def run(options: argparse.Namespace, within: list[str] | None) -> str:
+def run(options: argparse.Namespace) -> str:
     """Return the roots over a motion, as text, JSON, a picture or CSV."""
     if options.direction != "across":
         raise UsageError("--direction is left out beside --x, --y and --normal, which say it")
-    optional = [] if "." in options.unknown else [options.unknown]
-    if options.unknown == "f":
-        optional.append("omega")
+    unknown, within = options.unknown, options.between
+    optional = [] if "." in unknown else [unknown, *(["omega"] if unknown == "f" else [])]
     case, parts, line = read_motion(options, optional)
-    target = options.target
-    if options.ratio:
-        if "mu0" not in case:
-            raise UsageError("--ratio cannot be used with mu0 as the unknown: give --target alone")
-        target *= case["mu0"]
     solution = solve_motion(
-        options.unknown,
-        target,
-        within=None if within is None else (within[0], within[1]),
+        unknown,
+        common.target_in(options, case.inputs),
+        within=within,
         contact=options.contact,
-        **case,
+        **case.inputs,
         **parts,
     )
     (roots,) = solution.roots
     if not roots:
-        raise ImpossibleError(solution.reason() + _hint(options, case, solution))
-    if options.json:
-        return as_json(solution.to_dict())
-    if options.out is not None:
-        heads = [f"{solution.unknown} [{solution.unit}]", "between", "and", "mu_macro [-]"]
-        columns = dict(zip(heads, zip(*(root[:4] for root in roots), strict=True), strict=True))
-        return common.write_result(options.out, columns, solution.plot)
+        raise ImpossibleError(solution.reason() + common.other_meaning(options, case, solution))
     unit = _unit_of_roots(solution, within or (), options.digits)
-    table = [[f"{solution.unknown} [{unit.symbol}]", "between", "and", "mu_macro [-]"]]
+    names = ("between", "and", "mu_macro [-]")
+    table = [[f"{unknown} [{unit.symbol}]", *names]]
     for root in roots:
         width = root.high - root.low
         cells = [format_number(root.value, unit, 6, options.digits, width)]
         cells += [format_number(x, unit, 6, options.digits) for x in (root.low, root.high)]
-        mean = (
-            f"{root.mean:.{options.digits}g}"
-            if options.digits
-            else tidy_zeros(known(root.mean, 6, root.error_estimate))
-        )
-        table.append([*cells, mean])
-    said = filter(None, [solution.reason()])
-    return "\n".join([line, in_columns(table), *said])
+        mean = format_number(root.mean, Unit("-"), 6, options.digits, root.error_estimate)
+        table.append([*cells, mean if options.digits else tidy_zeros(mean)])
+    text = "\n".join([line, in_columns(table), *filter(None, [solution.reason()])])
+    heads = (f"{unknown} [{solution.unit}]", *names)
+    columns = dict(zip(heads, zip(*(root[:4] for root in roots), strict=True), strict=True))
+    return common.answer(options, solution, columns, text if options.out is None else "")
 
 
 def _unit_of_roots(solution: MotionSolution, typed: Sequence[str], digits: int | None) -> Unit:
@@ -79,8 +65,3 @@ def _unit_of_roots(solution: MotionSolution, typed: Sequence[str], digits: int |
         if symbol is not None and (unit := parse_unit(quantity, symbol)) is not None:
             return unit
     return suit_unit(si, first.value)
-
-
-def _hint(options: argparse.Namespace, case: Mapping[str, Any], solution: MotionSolution) -> str:
-    """Return what was perhaps meant if a target is out of reach."""
-    return common.other_meaning(options.target, options.ratio, case, solution.reach.holds)

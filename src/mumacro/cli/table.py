@@ -20,7 +20,7 @@ def run(words: Sequence[str]) -> str:
     options = parser.parse_args(words)
     surrogate = open_table(options.table)
     members = {
-        **common.table_members(surrogate),
+        **common.members_of(surrogate),
         "path": str(surrogate.path),
         "verified_max_abs_error": surrogate.max_abs_error,
         "verified_max_rel_error": surrogate.max_rel_error,

@@ -1,10 +1,17 @@
-"""Define the options for the layout of a table as text, for the commands that take files."""
+"""Read a table as text for a command: the options for its layout, the file, and the line that a
+refusal is about."""
 
 import argparse
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
 
-from mumacro.cli.common import UsageError
+from mumacro.cli.common import ImpossibleError, UsageError
+from mumacro.errors import InputError, TextError
 from mumacro.inputs.layout import SEPARATORS, Dialect
 from mumacro.inputs.numbers import THOUSANDS
+from mumacro.inputs.text_tables import TableOfNumbers
 
 
 def add_format(parser: argparse.ArgumentParser) -> None:
@@ -45,3 +52,31 @@ def dialect_in(options: argparse.Namespace) -> Dialect:
         rows=options.rows,
         sheet=options.sheet,
     )
+
+
+def read_table(name: str, read: Callable[[Path | bytes], TableOfNumbers]) -> TableOfNumbers:
+    """Return the table of a file, or of standard input, whose name is -."""
+    try:
+        return read(sys.stdin.buffer.read() if name == "-" else Path(name))
+    except TextError as error:
+        raise ImpossibleError(f"{name}: {error}") from None
+
+
+def fit_to(
+    command: str, name: str, table: TableOfNumbers, fit: Callable[[], Any], heads: Mapping[str, str]
+) -> Any:
+    """Return the fit to a table, and say on stderr how the table was read.
+
+    A refusal of a value names its line, and its column, whose header ``heads`` may have.
+    """
+    try:
+        result = fit()
+    except InputError as error:
+        at_line = f"line {table.lines[error.index]}: " if error.index is not None else ""
+        fault = InputError(heads.get(error.field, error.field), error.value, error.bound)
+        raise ImpossibleError(f"{name}: {at_line}{fault}") from None
+    except ModuleNotFoundError as error:  # it says what to install
+        raise ImpossibleError(str(error)) from None
+    if table.read_as:
+        print(f"mumacro {command}: read as: {table.read_as}", file=sys.stderr)
+    return result

@@ -314,7 +314,7 @@ def test_an_answer_is_the_librarys_to_every_bit(
     expected = surrogate.evaluate(**inputs, gradient=True)
     apart = (*words.split()[:2], "--json", *words.split()[2:])
     answer = json.loads(
-        output_of(capsys, 0, *apart, *options, "--gradient"), parse_constant=pytest.fail
+        output_of(capsys, 0, *apart, *options, "--include", "gradient"), parse_constant=pytest.fail
     )
     for key in ("mu_macro", "regime", "source", "error_bound"):
         assert answer[key] == getattr(expected, key)
