@@ -475,7 +475,7 @@ def note_lines(notes: Iterable[Note]) -> list[str]:
     return [f"{note.word}  {note.about}" for note in notes]
 
 
-def answer(
+def present(
     options: argparse.Namespace,
     result: Any,
     columns: Mapping[str, Any],

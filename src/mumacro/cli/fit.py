@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from mumacro import plotting
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError, in_columns, open_table
-from mumacro.cli.table_format import add_format, dialect_in, fit_to, read_table
+from mumacro.cli.table_format import add_format, dialect_in, fit_to, read_file
 from mumacro.fits.fit import fit
 from mumacro.fits.fitted import Fit
 from mumacro.fits.measured_points import STD, UNKNOWNS, read_points, unknowns_beside
@@ -54,7 +54,7 @@ def run(words: Sequence[str]) -> str:
     if wrong := [name for name in unknown if name not in UNKNOWNS]:
         raise UsageError(f"--unknown {wrong[0]}: k, mu0 or both can be fitted")
     kind, dialect = kind_of(options.contact, options.direction), dialect_in(options)
-    table = read_table(options.points, lambda source: read_points(source, dialect))
+    table = read_file(options.points, lambda source: read_points(source, dialect))
     unknown = unknown or unknowns_beside(table.columns)
     in_table = [name for name in table.columns if name in kind.columns]
     case = common.read_case(
@@ -77,7 +77,7 @@ def run(words: Sequence[str]) -> str:
     }
     columns |= {"mu_macro fitted": result.points["mu_macro"] - result.residuals}
     text = _text(result, options.digits)
-    return common.answer(options, result, columns, text, surrogate, **plotting.OF_FIT)
+    return common.present(options, result, columns, text, surrogate, **plotting.OF_FIT)
 
 
 def _text(result: Fit, digit_count: int | None) -> str:

@@ -8,7 +8,7 @@ from functools import partial
 from mumacro import plotting
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError, in_columns
-from mumacro.cli.table_format import add_format, dialect_in, fit_to, read_table
+from mumacro.cli.table_format import add_format, dialect_in, fit_to, read_file
 from mumacro.errors import InputError
 from mumacro.fits.loop import fit_loop
 from mumacro.fits.loop_fitted import LoopFit
@@ -69,13 +69,13 @@ def run(words: Sequence[str]) -> str:
     input_of = {name: "y0" if what == "displacement" else "Fz" for what, name in names.items()}
     column_names = ColumnNames(input_of, [(name,) for name in names.values()])
     dialect = dialect_in(options)
-    table = read_table(options.loop, lambda source: read_numbers(source, column_names, dialect))
+    table = read_file(options.loop, lambda source: read_numbers(source, column_names, dialect))
     columns = {what: table.columns[name] for what, name in names.items()} | load
     fit = partial(fit_loop, **columns, contact=options.contact, cycles=options.cycles)
     found = fit_to("fit-loop", options.loop, table, fit, names)
     heads = ("displacement [m]", "force [N]", "Fz [N]", "force fitted [N]")
     in_si = dict(zip(heads, found.loop.values(), strict=True))
-    return common.answer(options, found, in_si, _text(found), **plotting.OF_FIT)
+    return common.present(options, found, in_si, _text(found), **plotting.OF_FIT)
 
 
 def _load(words: Sequence[str], column: str | None) -> dict[str, float]:

@@ -89,7 +89,7 @@ def run(words: Sequence[str]) -> str:
         table = _table(columns, column_units, count, options.digits)
         lines = [common.case_line(case, kind), table, *notes]
     in_si = dict(zip(heads, columns.values(), strict=True))
-    return common.answer(options, law, in_si, "\n".join(lines), surrogate)
+    return common.present(options, law, in_si, "\n".join(lines), surrogate)
 
 
 def _table(

@@ -91,7 +91,7 @@ def run(words: Sequence[str]) -> str:
     columns = {}
     if options.out is not None and options.out.suffix == ".csv":
         columns = {f"{name} [{_SI[name]}]": x for name, x in motion.cycle()._asdict().items()}
-    return common.answer(options, motion, columns, text, **plotting.OF_CYCLE)
+    return common.present(options, motion, columns, text, **plotting.OF_CYCLE)
 
 
 def _shown(

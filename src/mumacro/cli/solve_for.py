@@ -123,7 +123,9 @@ def run(words: Sequence[str]) -> str:
     heads = _heads(f"{unknown} [{solution.unit}]", "k [N/m]" if solution.ends else None)
     in_si = [(*((k,) if solution.ends else ()), *root) for k, root in rows]
     columns = dict(zip(heads, zip(*in_si, strict=True), strict=True))
-    return common.answer(options, solution, columns, text if options.out is None else "", surrogate)
+    return common.present(
+        options, solution, columns, text if options.out is None else "", surrogate
+    )
 
 
 def _heads(unknown: str, k: str | None) -> list[str]:

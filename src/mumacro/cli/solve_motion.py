@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> str:
     text = "\n".join([line, in_columns(table), *filter(None, [solution.reason()])])
     heads = (f"{unknown} [{solution.unit}]", *names)
     columns = dict(zip(heads, zip(*(root[:4] for root in roots), strict=True), strict=True))
-    return common.answer(options, solution, columns, text if options.out is None else "")
+    return common.present(options, solution, columns, text if options.out is None else "")
 
 
 def _unit_of_roots(solution: MotionSolution, typed: Sequence[str], digits: int | None) -> Unit:

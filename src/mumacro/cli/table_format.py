@@ -54,7 +54,7 @@ def dialect_in(options: argparse.Namespace) -> Dialect:
     )
 
 
-def read_table(name: str, read: Callable[[Path | bytes], TableOfNumbers]) -> TableOfNumbers:
+def read_file(name: str, read: Callable[[Path | bytes], TableOfNumbers]) -> TableOfNumbers:
     """Return the table of a file, or of standard input, whose name is -."""
     try:
         return read(sys.stdin.buffer.read() if name == "-" else Path(name))
