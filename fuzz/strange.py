@@ -21,9 +21,8 @@ from urllib.parse import quote, urlencode
 
 import orjson
 
-from mumacro.contacts.geometries import GEOMETRIES
 from mumacro.outputs import OUTPUTS
-from mumacro.stiffness import AXES
+from mumacro.stiffness import AXES, GEOMETRIES
 from tests.support.measuring import ROOT, main, markdown, progress, sections
 from tests.support.serving import CASE, Server, serving
 

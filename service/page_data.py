@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from mumacro import plotting
-from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.errors import InputError
 from mumacro.inputs.fields import (
     AMPLITUDE,
@@ -25,7 +24,7 @@ from mumacro.inputs.fields import (
 )
 from mumacro.inputs.units import UNITS_OF, Scale
 from mumacro.outputs import OUTPUTS
-from mumacro.stiffness import MATERIALS, SOURCE_OF_MATERIALS
+from mumacro.stiffness import ARGUMENTS, BODIES, GEOMETRIES, MATERIALS, SOURCE_OF_MATERIALS
 from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import REGIMES
 

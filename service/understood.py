@@ -5,13 +5,13 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from mumacro.contacts.geometries import ARGUMENTS
 from mumacro.errors import InputError
 from mumacro.inputs.case import read
 from mumacro.inputs.fields import INPUTS, QUANTITY_OF, RIGID
 from mumacro.inputs.units import QUANTITIES
 from mumacro.motions.motion import PARTS
 from mumacro.motions.oscillation import read_oscillation
+from mumacro.stiffness import ARGUMENTS
 
 UNDERSTOOD = "inputs"  # the name in include
 

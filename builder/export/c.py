@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import mumacro
-from mumacro.contacts.quadrature import driven_rule
 from mumacro.errors import MumacroError
 from mumacro.kernel.arrays import Array
+from mumacro.kernel.quadrature import driven_rule
 from mumacro.table import atlas
 from mumacro.table.atomic import write_whole
 from mumacro.table.blocks import Table, TabulatedContact

@@ -17,7 +17,6 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails
 
-from mumacro.contacts.geometries import GEOMETRIES
 from mumacro.errors import InputError
 from mumacro.inputs.case import no_number, read_one, reason_of
 from mumacro.inputs.fields import AMPLITUDE, MOST_HZ, QUANTITY_OF, STIFFNESS, described
@@ -25,6 +24,7 @@ from mumacro.inputs.layout import SEPARATORS, Dialect
 from mumacro.inputs.numbers import THOUSANDS
 from mumacro.motions.motion import PARTS
 from mumacro.motions.solve_motion import UNKNOWNS
+from mumacro.stiffness import GEOMETRIES
 
 from .inputs import (
     EXAMPLE,

@@ -8,11 +8,11 @@ from typing import Any
 from fastapi import Request, Response
 
 import mumacro
-from mumacro.contacts.geometries import contact_of
 from mumacro.errors import InputError, TextError
 from mumacro.fits.measured_points import read_points, unknowns_beside
 from mumacro.inputs.text_tables import Most, TableOfNumbers
 from mumacro.inputs.workbooks import BEGIN as WORKBOOK
+from mumacro.stiffness import contact_of
 
 from .. import API_VERSION
 from ..admission import compute

@@ -10,10 +10,10 @@ from fastapi import Query, Request, Response
 
 import mumacro
 from mumacro.answer import Answer, nested
-from mumacro.contacts.stiffening import Stiffening
 from mumacro.errors import InputError
 from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import Cases, ends_in, named
+from mumacro.inputs.stiffening import Stiffening
 from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.outputs import MEMBERS

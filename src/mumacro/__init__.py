@@ -17,11 +17,11 @@ from mumacro.version import __version__
 if _TYPE_CHECKING:
     from mumacro import closed_forms, plotting, stiffness, validity
     from mumacro.answer import Answer
-    from mumacro.contacts.element import Element
     from mumacro.fits.fit import fit
     from mumacro.fits.fitted import Fit
     from mumacro.fits.loop import fit_loop
     from mumacro.fits.loop_fitted import LoopFit
+    from mumacro.motions.element import Element
     from mumacro.motions.harmonics import Harmonics, harmonics
     from mumacro.motions.motion import Motion, motion
     from mumacro.motions.solve_motion import MotionSolution, solve_motion
@@ -51,7 +51,7 @@ _PLACES = {
     "MotionSolution": "motions.solve_motion",
     "solve_motion": "motions.solve_motion",
     "Answer": "answer",
-    "Element": "contacts.element",
+    "Element": "motions.element",
     "Surrogate": "surrogate",
     "open": "surrogate",
     "REGIMES": "table.atlas",

@@ -28,6 +28,8 @@ Not included are: roughness and the holder, whose compliances are in series (:fu
 layers; and plastic flow, which begins below the surface at a Hertz pressure of about 1.6 times the
 yield strength.
 
+Command, service and page derive their fields from :data:`GEOMETRIES` and :data:`ARGUMENTS`.
+
 References
 ----------
 R. D. Mindlin, "Compliance of elastic bodies in contact", J. Appl. Mech. 16 (1949) 259.
@@ -39,12 +41,15 @@ times the one here.
 
 import math
 import warnings
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 from mumacro.errors import InputError
 from mumacro.inputs.cases import real
-from mumacro.results import WARNING, Note, Result, Rows
+from mumacro.inputs.doubts import UNITS
+from mumacro.inputs.names import unknown_name
+from mumacro.results import REMARK, WARNING, Note, Result, Rows
 
 # limits of numbers in SI, so that every product of them below is a double
 SMALLEST, LARGEST = 1e-60, 1e60
@@ -424,3 +429,122 @@ def in_series(*stiffnesses: float) -> float:
             raise InputError("stiffness", number, "> 0")
     total = sum(1.0 / number for number in numbers)
     return math.inf if total == 0.0 else 1.0 / total
+
+
+# --- geometries by name ---------------------------------------------------------------------------
+
+
+class Argument(NamedTuple):
+    """Describe one argument: SI unit, meaning, an example as a person writes it; for a choice its
+    only values."""
+
+    unit: str
+    meaning: str
+    example: str
+    choices: tuple[str, ...] = ()
+
+
+class Geometry(NamedTuple):
+    """Describe one geometry: its function, its meaning, and its own arguments (apart from those of
+    the two bodies)."""
+
+    function: Callable[..., Contact]
+    meaning: str
+    arguments: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of all arguments that it takes, including alternatives."""
+        instead = (INSTEAD[name] for name in self.arguments if name in INSTEAD)
+        return (*self.arguments, *instead, *BODIES)
+
+
+ARGUMENTS = {
+    "radius": Argument("m", "radius of ball, pin or cylinder; of two balls 1/(1/R1 + 1/R2)", "5mm"),
+    "diameter": Argument("m", "in place of the radius: twice as much", "10mm"),
+    "length": Argument("m", "length of the cylinder", "10mm"),
+    "Fz": Argument("N", "normal force", "10N"),
+    "oscillation": Argument(
+        "", "how the contact oscillates beside the axis of the cylinder", AXES[0], AXES
+    ),
+    "E": Argument("Pa", "Young's modulus of the first body; rigid, or a number", "210GPa"),
+    "nu": Argument("-", "its Poisson's ratio", "0.3"),
+    "E2": Argument(
+        "Pa",
+        "Young's modulus of the second body; left out, the bodies are of one material",
+        "70GPa",
+    ),
+    "nu2": Argument("-", "its Poisson's ratio; left out, that of the first body", "0.33"),
+}
+#: arguments of every geometry; the first two are required
+BODIES = ("E", "nu", "E2", "nu2")
+#: pairs of arguments of which one replaces the other
+INSTEAD = {"radius": "diameter"}
+#: lengths that bodies usually have [m]
+_USUAL = 1e-6, 0.5
+GEOMETRIES = {
+    "ball": Geometry(hertz_ball, "a ball on a flat, or two balls", ("radius", "Fz")),
+    "flat": Geometry(
+        flat_punch,
+        "a flat circular end in full contact, such as a pin that has run in",
+        ("radius", "Fz"),
+    ),
+    "cylinder": Geometry(
+        hertz_cylinder, "a lying cylinder", ("radius", "length", "Fz", "oscillation")
+    ),
+}
+
+
+def contact_of(geometry: str, /, **arguments: Any) -> Contact:
+    """Return the contact of one of :data:`GEOMETRIES`, from its arguments and those of the bodies
+    in SI.
+
+    Its notes have the warnings, and remarks on lengths that are unusual for a body.  Raise
+    InputError for an unknown geometry, and for an argument that is missing, unknown, not a number
+    or out of bounds.
+
+    >>> contact_of("ball", radius=5e-3, Fz=10.0, E=210e9, nu=0.3).contact
+    'ball'
+    """
+    if geometry not in GEOMETRIES:
+        raise InputError("geometry", geometry, f"one of {', '.join(GEOMETRIES)}")
+    entry, values = GEOMETRIES[geometry], dict(arguments)
+    for name, value in arguments.items():
+        if name not in entry.names:
+            raise InputError(name, value, f"left out: {unknown_name(name, entry.names)}")
+        if not ARGUMENTS[name].choices:
+            _number(name, value)
+    if "diameter" in values:
+        if "radius" in values:
+            raise InputError("diameter", values["diameter"], "left out beside radius")
+        values["radius"] = 0.5 * values.pop("diameter")
+    for name in (*entry.arguments, "E", "nu"):
+        if name not in values:
+            unit, meaning, *_ = ARGUMENTS[name]
+            words = f"{meaning}; or {INSTEAD[name]}" if name in INSTEAD else meaning
+            raise InputError(name, None, f"given{f' [{unit}]' if unit else ''}: {words}")
+    first = Material(values["E"], values["nu"])
+    second = Material(values.get("E2", first.E), values.get("nu2", first.nu))
+    lengths_and_load = {name: values[name] for name in entry.arguments}
+    try:
+        contact = entry.function(first=first, second=second, **lengths_and_load)
+    except InputError as error:
+        if error.field != "radius" or "diameter" not in arguments:
+            raise
+        bound = f"twice a radius that is {error.bound}"
+        raise InputError("diameter", arguments["diameter"], bound) from None
+    return replace(contact, notes=(*contact.notes, *_doubts_of(arguments)))
+
+
+def _doubts_of(arguments: Mapping[str, Any]) -> list[Note]:
+    """Return a question for each length of a geometry that is unusual for a body."""
+    least, most = _USUAL
+    remarks: list[Note] = []
+    for name in ("radius", "diameter", "length"):
+        value = arguments.get(name)
+        if value is None or least <= value <= most:
+            continue
+        question = f"is it {value:.6g} mm?" if value > most else "is it in metres?"
+        text = f"{name} = {value:.6g} m: {question} Usual is {least:g} to {most:g} m"
+        remarks.append(Note(REMARK, text, UNITS, name))
+    return remarks

@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mumacro.answer import BAND, Answer
-from mumacro.contacts.stiffening import ROUGH, Stiffening
 from mumacro.errors import InputError
 from mumacro.inputs.doubts import FURTHEST, UNITS
 from mumacro.inputs.fields import AMPLITUDE, RAD_PER_CYCLE, RIGID, SPRINGS_OF, Kind, kind_of
 from mumacro.inputs.numbers import plain
+from mumacro.inputs.stiffening import ROUGH, Stiffening
 from mumacro.outputs.settling import REMAINING, decay_of_springs
 from mumacro.outputs.tabulated import Tabulated
 from mumacro.results import ASSUMES, Note, Row

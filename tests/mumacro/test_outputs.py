@@ -11,9 +11,9 @@ import pytest
 
 from mumacro import InputError, Surrogate, solve_for
 from mumacro.answer import TEXTS
-from mumacro.contacts.element import Element
 from mumacro.inputs.cases import Cases, named
 from mumacro.inputs.fields import KINDS, Kind
+from mumacro.motions.element import Element
 from mumacro.motions.motion import motion
 from mumacro.outputs import MEMBERS, OUTPUTS
 from tests.support.cases import CASE, Case, as_kind, flat, tables, without

@@ -12,21 +12,19 @@ import pytest
 
 from mumacro import InputError, Surrogate, stiffness
 from mumacro.cli.main import main
-from mumacro.contacts.geometries import (
+from mumacro.inputs.case import read_one
+from mumacro.stiffness import (
     ARGUMENTS,
+    AXES,
     BODIES,
     GEOMETRIES,
     INSTEAD,
-    contact_of,
-    doubts_of,
-    read_argument,
-)
-from mumacro.stiffness import (
-    AXES,
     MATERIALS,
     Contact,
     Material,
+    _doubts_of,
     ball_on_flat,
+    contact_of,
     cylinder_on_flat,
     flat_punch,
     in_series,
@@ -278,16 +276,11 @@ def test_arguments_are_read_with_units() -> None:
         "Fz": ("10N", 10.0),
         "nu": ("0.3", 0.3),
     }
-    for name, (text, value) in {
-        **read,
-        "E2": ("Rigid", math.inf),
-        "oscillation": (" along ", "along"),
-    }.items():
-        assert read_argument(name, text) == value
-    with pytest.raises(InputError) as refused:
-        read_argument("E", "210 N")
-    assert refused.value.field == "E"
-    assert read_argument("nu", "0,3") == 0.3
+    for name, (text, value) in {**read, "E2": ("Rigid", math.inf)}.items():
+        assert read_one(name, text) == value
+    with refused("E"):
+        read_one("E", "210 N")
+    assert read_one("nu", "0,3") == 0.3
 
 
 def test_a_result_can_be_passed_on(surrogate: Surrogate) -> None:
@@ -321,7 +314,7 @@ def test_a_diameter_is_twice_a_radius(geometry: str) -> None:
 @pytest.mark.parametrize("name", ["radius", "diameter", "length"])
 def test_lengths_that_bodies_do_not_have_are_doubted(name: str) -> None:
     for value, doubted in ((1e-9, True), (1e-6, False), (5e-3, False), (0.5, False), (5.0, True)):
-        assert [one.field for one in doubts_of({name: value})] == [name] * doubted
+        assert [one.field for one in _doubts_of({name: value})] == [name] * doubted
 
 
 def test_materials_have_a_name(capsys: Capture) -> None:

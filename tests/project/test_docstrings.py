@@ -41,7 +41,7 @@ def test_there_are_examples() -> None:
         "answer.Answer",
         "table.bundled.bundled_tables",
         "fits.fit.fit",
-        "contacts.element.Element",
+        "motions.element.Element",
     }
     used |= {f"surrogate.Surrogate.{name}" for name in ("evaluate", "mu_ratio", "open", "slopes")}
     assert {f"mumacro.{name}" for name in used} <= shown

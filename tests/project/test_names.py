@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from mumacro.cli.main import COMMANDS
-from mumacro.contacts.geometries import GEOMETRIES
+from mumacro.stiffness import GEOMETRIES
 from service.metrics import Metrics
 from service.settings import PREFIX, Settings
 from tests.support.documents import MANIFESTS, PAGES, SPAN, blocks, is_command, mentions, plain

@@ -16,9 +16,9 @@ import pytest
 from starlette.testclient import TestClient
 
 from mumacro import Surrogate, plotting
-from mumacro.contacts.geometries import ARGUMENTS, BODIES, GEOMETRIES
 from mumacro.inputs.fields import CONTACTS, DIRECTIONS
 from mumacro.inputs.units import UNITS_OF
+from mumacro.stiffness import ARGUMENTS, BODIES, GEOMETRIES
 from service.app import create_app
 from service.settings import Settings
 from tests.support.browser import START

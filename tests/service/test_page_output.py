@@ -15,7 +15,7 @@ import pytest
 
 import mumacro
 from mumacro import Surrogate, plotting
-from mumacro.contacts.geometries import contact_of
+from mumacro.stiffness import contact_of
 from service.routers.page import ASSETS
 from tests.support.browser import RECORDED, START, plain
 from tests.support.cases import Case

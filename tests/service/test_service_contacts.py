@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate
-from mumacro.contacts.geometries import ARGUMENTS, GEOMETRIES
+from mumacro.stiffness import ARGUMENTS, GEOMETRIES
 from mumacro.validity import digits, effect_of, rows_of
 from tests.support.cases import Case
 from tests.support.comparing import close

@@ -13,8 +13,8 @@ import pytest
 
 import mumacro
 from mumacro import Surrogate
-from mumacro.contacts.geometries import contact_of
 from mumacro.outputs import OUTPUTS
+from mumacro.stiffness import contact_of
 from service.routers.questions import unit_at
 from tests.support.cases import Case
 from tests.support.comparing import close

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.contacts.quadrature import piece_rule
+from mumacro.kernel.quadrature import piece_rule
 
 Long = np.longdouble
 #: mu~, power, stick fraction, slopes along ln v~ and ln y~

@@ -6,15 +6,17 @@ from typing import Any
 
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns
-from mumacro.contacts.geometries import (
+from mumacro.inputs.case import read_one
+from mumacro.stiffness import (
     ARGUMENTS,
     BODIES,
     GEOMETRIES,
     INSTEAD,
+    MATERIALS,
+    NUMBERS,
+    Material,
     contact_of,
-    read_argument,
 )
-from mumacro.stiffness import MATERIALS, NUMBERS, Material
 
 
 def _example(geometry: str) -> str:
@@ -77,8 +79,9 @@ def run(words: Sequence[str]) -> str:
         common.add_form(part)
     options = parser.parse_args(words)
     names = GEOMETRIES[options.geometry].names
-    texts = {name: text for name in names if (text := getattr(options, name)) is not None}
-    arguments = dict(zip(texts, common.read_values(texts.items(), read_argument), strict=True))
+    arguments = {name: text for name in names if (text := getattr(options, name)) is not None}
+    texts = {name: text for name, text in arguments.items() if not ARGUMENTS[name].choices}
+    arguments |= zip(texts, common.read_values(texts.items(), read_one), strict=True)
     arguments |= _of_materials(options, arguments)
     contact = contact_of(options.geometry, **arguments)
     if options.json:

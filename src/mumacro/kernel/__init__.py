@@ -15,5 +15,6 @@ when the library is loaded.
 - ``dimensional.c``, ``interval.c``: cases in SI units, an interval of k
 - ``element.c``: steps in time; ``motion.c``, ``motion_slip.c``, ``motion_cycle.c``,
   ``motion_ball.c``: steady cycles of any motion; ``loop.c``: the force over a way, for loops
-- ``binding.py``, ``arrays.py``, ``threads.py``: the shared object from Python, and long arrays
+- ``binding.py``, ``arrays.py``, ``threads.py``, ``quadrature.py``: the shared object from Python,
+  long arrays, the quadrature over a ball
 """

@@ -1,2 +1,2 @@
-"""Compute any periodic motion of a contact: its mean friction, the motion that gives a wanted
-friction, and samples as harmonics."""
+"""Compute any motion of a contact: a periodic one, with its mean friction, and the one that gives a
+wanted friction; samples as harmonics; and steps in time."""

@@ -14,13 +14,13 @@ from typing import Any, Final, Self
 import numpy as np
 
 from mumacro import closed_forms
-from mumacro.contacts.quadrature import prepare_driven
 from mumacro.errors import TableError
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.fields import CONTACTS, SPRING, Kind
 from mumacro.kernel import threads as slices
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.kernel.binding import CaseRows, Data, Detail, ExtremeRows, SlopeRows, kernels
+from mumacro.kernel.quadrature import prepare_driven
 from mumacro.table import atlas
 from mumacro.table.blocks import BorderPiece, Table
 from mumacro.table.polynomials import Border, block_rows, outer_cells, quantity_cells

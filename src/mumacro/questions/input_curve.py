@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from mumacro.answer import Answer
-from mumacro.contacts.stiffening import Stiffening
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.fields import AMPLITUDE, SPRING, Kind
+from mumacro.inputs.stiffening import Stiffening
 from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 

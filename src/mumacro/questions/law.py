@@ -11,7 +11,6 @@ import numpy as np
 
 from mumacro import plotting
 from mumacro.answer import BAND, Answer
-from mumacro.contacts.stiffening import Stiffening, stiffening_of
 from mumacro.errors import InputError
 from mumacro.inputs.case import read, read_one
 from mumacro.inputs.cases import DEVIATIONS, fixed_inputs, named, without_interval
@@ -27,6 +26,7 @@ from mumacro.inputs.fields import (
     field_of,
     kind_of,
 )
+from mumacro.inputs.stiffening import Stiffening, stiffening_of
 from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.outputs.evaluation import chosen

@@ -39,11 +39,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mumacro.contacts.stiffening import stiffening_of
 from mumacro.errors import InputError
 from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import fixed_inputs, real, without_interval
 from mumacro.inputs.fields import AMPLITUDE, POSITIVE, QUANTITY_OF, Numbers, field_of, kind_of
+from mumacro.inputs.stiffening import stiffening_of
 from mumacro.kernel.arrays import Array
 from mumacro.questions.input_curve import EVERYWHERE, InputCurve
 from mumacro.questions.law import law

@@ -17,13 +17,13 @@ import pytest
 
 from mumacro import InputError, Surrogate, fit
 from mumacro.cli.main import COMMANDS, main
-from mumacro.contacts.geometries import GEOMETRIES, contact_of
 from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.fields import ENDS, NAMES, SI
 from mumacro.inputs.names import suggestion
 from mumacro.inputs.units import UNITS_OF, scale_of, split_unit
 from mumacro.outputs.tabulated import Tabulated
+from mumacro.stiffness import GEOMETRIES, contact_of
 from mumacro.validity import rows_of
 from tests.support.cases import Capture, Case
 from tests.support.comparing import close

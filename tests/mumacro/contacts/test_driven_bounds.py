@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate
-from mumacro.contacts.quadrature import DRIVEN_NODES, piece_rule
+from mumacro.kernel.quadrature import DRIVEN_NODES, piece_rule
 from tests.support import extended
 from tests.support.cases import Array, opened, tables
 from tests.support.driven import answered, hard, ordinary

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from builder.approximations import approximations, border_speeds
 from mumacro import Surrogate
 from mumacro.cli.main import main
-from mumacro.contacts.stiffening import Stiffening
+from mumacro.inputs.stiffening import Stiffening
 from mumacro.questions.law import law as friction_law
 from mumacro.questions.solve_for import solve_for
 from mumacro.validity import load_notes
