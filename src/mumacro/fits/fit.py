@@ -120,17 +120,16 @@ class _Problem(Measured):
             steps = slope * np.where(np.isfinite(x), x, 0.0)[:, None]
             return mu * self.weight, np.nan_to_num(steps, posinf=0.0, neginf=0.0) * self.weight
 
-        low, high = self._ends_of_mu0() if along == "mu0" else self._ends_of_k(has_factor)
+        if along == "mu0":  # from a small one to a large one
+            top = math.log(self.mu.max())
+            low, high = top + math.log(1e-3), top + math.log(1e6)
+        else:
+            low, high = self._ends_of_k(has_factor)
         low, high = np.clip([low, high], -650.0, 650.0)
         nodes = int(np.clip((high - low) / math.log(10.0) * _PER_DECADE, 16, _MOST_NODES))
         s = np.linspace(low, high, nodes)
         rigid = [math.inf] if along == "k" else []
         return Profile(model, self.weight * self.mu, has_factor, np.append(s, rigid), limit_of)
-
-    def _ends_of_mu0(self) -> tuple[float, float]:
-        """Return the logarithms of a small and of a large mu0, for a known k."""
-        top = math.log(self.mu.max())
-        return top + math.log(1e-3), top + math.log(1e6)
 
     def _ends_of_k(self, per_mu0: bool) -> tuple[float, float]:
         """Return two logarithms of k, or of k/mu0: one so small that friction is mu0, and one so
@@ -146,7 +145,7 @@ class _Problem(Measured):
                 np.minimum(speed_length, speed_length / amplitude * speed_length),
                 amplitude,
             )
-            soft = _SOFT[self.direction] * (force / amplitude)[oscillates].min()
+            soft = _SOFT[self.kind.names["direction"]] * (force / amplitude)[oscillates].min()
             stiff = 100.0 * (force / length)[oscillates].max()
             mu0 = 1.0 if per_mu0 else float(np.median(self.columns["mu0"]))
             low, high = np.log([soft, stiff]) + math.log(mu0)
@@ -200,10 +199,9 @@ class _Problem(Measured):
             chi2 / dof if dof else math.nan,
             solution_dicts,
             (*self._warnings(values, interval, solution_dicts, chi2, dof), *self.remarks()),
-            self.contact,
-            self.direction,
-            points,
-            self,
+            **self.kind.names,
+            points=points,
+            _problem=self,
         )
 
     def _solutions(self, profile: Profile, barrier_at: Callable[[float], float]) -> list[_Minimum]:
@@ -239,17 +237,13 @@ class _Problem(Measured):
         values = {"k": x * factor, "mu0": factor}
         return {name: values[name] for name in self.unknowns}
 
-    def _log_slopes(self, values: Mapping[str, float]) -> Array:
-        """Return d(weighted mu_macro) / d ln(unknown), shape (points, unknowns).  It is 0 for an
-        infinite k."""
-        slopes = self.model(values, self.columns)[1]
-        columns = [slopes[name] * (x if math.isfinite(x) else 0.0) for name, x in values.items()]
-        return np.stack(columns, axis=-1) * self.weight[:, None]
-
     def _covariance(self, values: Mapping[str, float], variance: float) -> Array:
         """Return the covariance of the logarithms of the unknowns.  It is infinite for an unknown
         that the points do not determine."""
-        slopes = self._log_slopes(values)
+        by_name = self.model(values, self.columns)[1]
+        # d(weighted mu_macro) / d ln(unknown), (points, unknowns); 0 for an infinite k
+        steps = [by_name[name] * (x if math.isfinite(x) else 0.0) for name, x in values.items()]
+        slopes = np.stack(steps, axis=-1) * self.weight[:, None]
         determined = np.abs(slopes).max(axis=0) > 1e-12 * np.abs(self.weight * self.mu).max()
         covariance = np.diag(np.where(determined, 0.0, math.inf))
         _, singular_values, right_vectors = np.linalg.svd(
@@ -280,13 +274,8 @@ class _Problem(Measured):
                 name: (min(x[name][0] for x in each), max(x[name][1] for x in each))
                 for name in self.unknowns
             }
-        return self._allowed_ranges(profile)
-
-    def _allowed_ranges(self, profile: Profile) -> dict[str, tuple[float, float]]:
-        """Return the smallest and the largest value of each unknown among the allowed contacts.  If
-        the softest sample is allowed, k has no lower bound."""
         ranges = dict(zip(self.unknowns, profile.ranges(), strict=True))
-        if profile.samples.chi2[0] <= profile.limit:
+        if profile.samples.chi2[0] <= profile.limit:  # the softest contact: k has no lower bound
             along = self.unknowns[0]
             ranges[along] = 0.0, ranges[along][1]
         return ranges
@@ -337,7 +326,7 @@ class _Problem(Measured):
                 messages.append(
                     f"reduced chi2 {chi2 / dof:.3g}: the points scatter by more than their std"
                 )
-        if self.contact == "ball" and "k" in values and np.ptp(self.columns["Fz"]) > 0.0:
+        if self.kind.contact and "k" in values and np.ptp(self.columns["Fz"]) > 0.0:
             messages.append(
                 "one k for all loads, while k of a ball grows like Fz^(1/3): fit each load alone"
             )

@@ -35,17 +35,6 @@ class Prediction(Result, _Prediction):
         """Return mu_macro and its standard deviation by name; for a frame one row for each case."""
         return self._asdict()
 
-    def _heading(self) -> str:
-        if shape := np.shape(self.mu_macro):
-            return f"<Prediction of cases of shape {shape}>"
-        return f"Prediction(mu_macro={self.mu_macro!r}, std={self.std!r})"
-
-    def _rows(self) -> Rows | None:
-        return None if np.shape(self.mu_macro) else []
-
-    def _in_full(self) -> tuple[str, Rows | None, list[str]]:
-        return self._heading(), None, []
-
 
 @dataclass(frozen=True, repr=False)
 class Fit(Result):
@@ -96,17 +85,16 @@ class Fit(Result):
     _problem: Measured = field(repr=False, compare=False)
 
     @np.errstate(all="ignore")
-    def predict(self, cases: Any = None, /, **inputs: Any) -> Prediction:
+    def predict(self, **inputs: Any) -> Prediction:
         """Return mu_macro of the fit and its standard deviation, at the measured points or for
         other inputs.
 
         Parameters
         ----------
-        cases : mapping, DataFrame, Arrow table or Dataset, optional
-            Inputs by name, as for :meth:`mumacro.Surrogate.evaluate`; other columns are ignored.
         **inputs : float or array_like
-            The same by keyword: Fz, y0, omega or f, v0, and k or mu0 if it was known.  An input
-            that is left out has the value of the points.
+            Fz, y0, omega or f, v0, and k or mu0 if it was known, as for
+            :meth:`mumacro.Surrogate.evaluate`.  An input that is left out has the value of the
+            points.
 
         Returns
         -------
@@ -131,7 +119,7 @@ class Fit(Result):
         >>> f"{at_lower_frequency.mu_macro:.3f} ± {at_lower_frequency.std:.3f}"
         '0.266 ± 0.003'
         """
-        columns = self._problem.elsewhere(cases, inputs)
+        columns = self._problem.elsewhere(inputs)
         mu, slopes = self._problem.model(self.values, columns)
         # a rigid contact has no derivative with respect to k
         covariance = np.where(np.isfinite(self.covariance), self.covariance, 0.0)

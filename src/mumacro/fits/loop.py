@@ -148,25 +148,20 @@ class _Loop:
     def _take(self, x: Array, force: Array, load: Array, chosen: tuple[int, int] | None) -> None:
         """Select the samples in use, the cycles among them, and the samples that count."""
         found = cycles_of(x)
-        part = slice(0, x.size)
+        begins, part = np.array(found.begins), slice(None)
         if chosen is not None:
             first, last = _whole(chosen)
             if not 1 <= first <= last <= found.number:
-                raise InputError(
-                    "cycles", chosen, f"from 1 to {found.number}, the whole cycles there are"
-                )
-            part = slice(found.begins[first - 1], found.begins[last])
-        self.x = np.ascontiguousarray(x[part])
-        self.force = np.ascontiguousarray(force[part])
-        self.Fz = np.ascontiguousarray(load[part])
-        if chosen is not None:
-            begins = [begin - part.start for begin in found.begins[first - 1 : last + 1]]
-        else:
-            begins = [*found.begins]
-        self.begins, self.number = begins, len(begins) - 1
+                bound = f"from 1 to {found.number}, the whole cycles there are"
+                raise InputError("cycles", chosen, bound)
+            begins = begins[first - 1 : last + 1]
+            part = slice(begins[0], begins[-1])
+        self.x, self.force, self.Fz = x[part], force[part], load[part]
+        self.begins = (begins - begins[0]).tolist()
+        self.number = len(self.begins) - 1
         self.open = self.number == 0
-        self.before = begins[1] if self.number == 1 else 0
-        self.counted = slice(begins[1] if self.number > 1 else 0, None)
+        self.before = self.begins[1] if self.number == 1 else 0
+        self.counted = slice(self.begins[1] if self.number > 1 else 0, None)
         if self.open:
             if self.code:
                 bound = "at least one whole cycle of a ball: its springs have a state of their own"
@@ -188,11 +183,12 @@ class _Loop:
         n = self.x.size
         times = np.arange(n, dtype=np.float64)[self.counted]
         middle, half = 0.5 * (times[0] + times[-1]), max(0.5 * float(np.ptp(times)), 1.0)
-        self.names = [] if self.open else ["offset", *(["drift"] if self.number > 1 else [])]
+        self.names = ("offset", "drift")[: 0 if self.open else min(self.number, 2)]
         terms = np.stack([np.ones(times.size), (times - middle) / half], axis=1)
         self.linear = terms[:, : len(self.names)]
-        # the drift begins at the first sample; the offset is the force there
-        self.first, self.step = (times[0] - middle) / half, 1.0 / half
+        # from the factors of these columns to the offset, at the first sample, and the drift
+        turn = np.array([[1.0, (times[0] - middle) / half], [0.0, 1.0 / half]])
+        self.turn = turn[: len(self.names), : len(self.names)]
         self.basis = np.linalg.qr(self.linear)[0] if self.names else self.linear
         self.measured = self.force[self.counted]
         self.beside = self._aside(self.measured[None, :])[0]
@@ -265,7 +261,7 @@ class _Loop:
             profile = self._profile(start, spare)
         size = float(self.beside @ self.beside)
         variance = max(chi2 / dof * tau, 1e-30 * size)
-        sticks = self._sticks(slopes)
+        sticks = slopes[self.counted] != 0.0
         values = {"k": mu0 * math.exp(s), "mu0": mu0, **linear}
         interval = self._intervals(profile, values, rows, slopes, variance, max(int(dof), 1))
         self._say_open_ends(values, interval, sticks)
@@ -322,22 +318,12 @@ class _Loop:
         if not self.names:
             return {}
         shares = np.linalg.lstsq(self.linear, self.measured - mu0 * rows[self.counted])[0]
-        return dict(zip(self.names, self._in_samples(shares).tolist(), strict=True))
-
-    def _in_samples(self, shares: Array) -> Array:
-        """Return the offset and the drift per sample from the factors of their columns."""
-        if len(self.names) < 2:
-            return shares
-        return np.array([shares[0] + self.first * shares[1], self.step * shares[1]])
+        return dict(zip(self.names, (self.turn * shares).sum(axis=1).tolist(), strict=True))
 
     def _line(self, linear: dict[str, float]) -> Array:
         """Return the sum of offset and drift at all samples."""
         times = np.arange(self.x.size) - (self.counted.start or 0)
         return np.asarray(linear.get("offset", 0.0) + linear.get("drift", 0.0) * times)
-
-    def _sticks(self, slopes: Array) -> Bools:
-        """Return which of the samples that count stuck during their step."""
-        return np.asarray(slopes[self.counted] != 0.0)
 
     def _energy(self, linear: dict[str, float]) -> float:
         """Return the work of the force over a whole cycle [J], the mean over the cycles that
@@ -372,14 +358,8 @@ class _Loop:
         inverse = np.linalg.pinv(columns.T @ columns)
         off = width * np.sqrt(variance * np.maximum(np.diag(inverse), 0.0))
         halves = {"k": off[0] * values["k"], "mu0": off[1]}
-        if self.names:
-            turned = np.eye(len(self.names))
-            if len(self.names) > 1:
-                turned = np.array([[1.0, self.first], [0.0, self.step]])
-            covariance = turned @ inverse[2:, 2:] @ turned.T
-            halves |= zip(
-                self.names, (width * np.sqrt(variance * np.diag(covariance))).tolist(), strict=True
-            )
+        spread = np.diag(self.turn @ inverse[2:, 2:] @ self.turn.T)
+        halves |= zip(self.names, (width * np.sqrt(variance * spread)).tolist(), strict=True)
         around = {
             name: (values[name] - float(half), values[name] + float(half))
             for name, half in halves.items()
@@ -388,15 +368,10 @@ class _Loop:
         narrow = straight and max(off[0], off[1] / mu0) < _NARROW
         if narrow and math.isfinite(values["k"]) and profile.samples.chi2[0] > profile.limit:
             return around
-        return self._by_profile(profile) | self._linear_by_profile(profile, around)
-
-    def _by_profile(self, profile: Profile) -> dict[str, tuple[float, float]]:
-        """Return the smallest and the largest k and mu0 among the allowed contacts.  If a straight
-        line is allowed, the loop need not slip, and mu0 has no upper bound."""
         ranges = dict(zip(("k", "mu0"), profile.ranges(), strict=True))
-        if profile.samples.chi2[0] <= profile.limit:
+        if profile.samples.chi2[0] <= profile.limit:  # a straight line: the loop need not slip
             ranges["mu0"] = ranges["mu0"][0], math.inf
-        return ranges
+        return ranges | self._linear_by_profile(profile, around)
 
     def _linear_by_profile(
         self, profile: Profile, around: dict[str, tuple[float, float]]
@@ -413,11 +388,8 @@ class _Loop:
             columns = np.column_stack([row, self.linear])
             inverse = np.linalg.pinv(columns.T @ columns)
             shares = inverse @ (columns.T @ self.measured)
-            turned = np.eye(len(self.names))
-            if len(self.names) > 1:
-                turned = np.array([[1.0, self.first], [0.0, self.step]])
-            middle = turned @ shares[1:]
-            spread = np.diag(turned @ inverse[1:, 1:] @ turned.T)
+            middle = self.turn @ shares[1:]
+            spread = np.diag(self.turn @ inverse[1:, 1:] @ self.turn.T)
             half = np.sqrt(np.maximum(profile.limit - profile.samples.chi2[i], 0.0) * spread)
             for name, value, off in zip(self.names, middle.tolist(), half.tolist(), strict=True):
                 ends[name] = [min(ends[name][0], value - off), max(ends[name][1], value + off)]

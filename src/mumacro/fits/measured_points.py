@@ -1,7 +1,7 @@
 """Check the columns of measured points, and evaluate the model at them, for
 :mod:`mumacro.fits.fit`."""
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -81,51 +81,30 @@ class Measured:
         unknowns = tuple(unknowns_beside(unknown_columns)) if unknowns is None else unknowns
         if not unknowns or len(set(unknowns)) != len(unknowns) or set(unknowns) - set(UNKNOWNS):
             raise InputError("unknowns", unknowns, 'one or both of "k" and "mu0"')
-        self.unknowns, self.contact, self.direction, self.surrogate = (
-            unknowns,
-            contact,
-            direction,
-            surrogate,
-        )
+        self.unknowns, self.surrogate = unknowns, surrogate
         self.kind = kind_of(contact, direction)
-        self.amplitude = AMPLITUDE if direction == "normal" else "y0"
+        self.amplitude = self.kind.amplitude
         self._read(self._inputs(data, fixed))
         self._check()
 
     def _inputs(self, data: Any, fixed: Mapping[str, Any]) -> dict[str, Any]:
-        names = [
-            name
-            for name in NAMES
-            if name not in self.unknowns and (name != "y0" or name == self.amplitude)
-        ]
-        names += [self.amplitude] if self.amplitude not in names else []
-        for name in fixed:
-            if name in self.unknowns:
-                raise InputError(
-                    name,
-                    fixed[name],
-                    f"left out, or taken from unknowns={self.unknowns}: it is fitted",
-                )
-            if name not in (*names, "mu_macro", FORCE, STD):
-                raise InputError(
-                    name, fixed[name], f"one of {', '.join(names)}; {unknown_name(name, names)}"
-                )
+        """Return the columns and the keywords by name.  Raise InputError for one that is fitted,
+        unknown, given twice or missing."""
+        left_out = (*self.unknowns, self.kind.other_amplitude)
+        names = [name for name in (*NAMES, AMPLITUDE) if name not in left_out]
+        results = ("mu_macro", FORCE, STD)
+        is_fitted = f"left out, or taken from unknowns={self.unknowns}: it is fitted"
+        self._refuse_names(fixed, names, results, is_fitted)
         if isinstance(data, Mapping) and not library_of(data):  # a table may have other columns
-            members = (*names, *UNKNOWNS, "mu_macro", FORCE, STD)
+            members = (*names, *UNKNOWNS, *results)
             for name in data:
                 if name not in members and split_unit(str(name))[0] not in members:
                     raise no_such_input(str(name), data[name], members)
-        columns = select("data", data, [*names, "mu_macro", FORCE, STD])
-        if duplicates := [name for name in select("data", data, UNKNOWNS) if name in self.unknowns]:
-            raise InputError(
-                duplicates[0],
-                "a column",
-                f"left out, or taken from unknowns={self.unknowns}: it is fitted",
-            )
-        if duplicates := sorted(columns.keys() & fixed.keys()):
-            raise InputError(
-                duplicates[0], fixed[duplicates[0]], "given once: as a column or as a keyword"
-            )
+        columns = select("data", data, [*names, *results])
+        for name in select("data", data, self.unknowns):
+            raise InputError(name, "a column", is_fitted)
+        for name in sorted(columns.keys() & fixed.keys()):
+            raise InputError(name, fixed[name], "given once: as a column or as a keyword")
         inputs = {**columns, **fixed}
         force = inputs.pop(FORCE, None)
         if force is not None and "mu_macro" not in inputs:
@@ -139,6 +118,17 @@ class Measured:
                     + (f", or {FORCE} with Fz" if name == "mu_macro" else ""),
                 )
         return inputs
+
+    def _refuse_names(
+        self, inputs: Mapping[str, Any], names: list[str], results: Iterable[str], is_fitted: str
+    ) -> None:
+        """Raise InputError for the name of an input that is fitted or unknown."""
+        for name, value in inputs.items():
+            if name in self.unknowns:
+                raise InputError(name, value, is_fitted)
+            if name not in names and name not in results:
+                bound = f"one of {', '.join(names)}; {unknown_name(name, names)}"
+                raise InputError(name, value, bound)
 
     def _read(self, data: dict[str, Any]) -> None:
         """Read columns of the same length, (n,), in SI."""
@@ -225,42 +215,20 @@ class Measured:
         cases = int(np.count_nonzero(doubtful))
         return [Note(REMARK, text, UNITS, "mu_macro", cases=cases), *doubts]
 
-    def elsewhere(self, cases: Any, inputs: Mapping[str, Any]) -> dict[str, Any]:
+    def elsewhere(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return the inputs for :meth:`model` at other points: the ones in the call, and for the
         rest the value that all points have."""
-        names = [*self.columns, "f"]
-        for name in inputs:
-            if name in self.unknowns:
-                raise InputError(name, inputs[name], "left out: it is fitted")
-            if name not in names:
-                raise InputError(
-                    name, inputs[name], f"one of {', '.join(names)}; {unknown_name(name, names)}"
-                )
-        values = {} if cases is None else select("cases", cases, [*names, *self.unknowns])
-        for name in values:
-            if name in self.unknowns:
-                raise InputError(name, "a column", "left out: it is fitted")
-            if name in inputs:
-                raise InputError(name, inputs[name], "given once: in the cases or as a keyword")
-        values = {name: to_si(name, value) for name, value in {**values, **inputs}.items()}
-        if not values:
+        self._refuse_names(inputs, [*self.columns, "f"], (), "left out: it is fitted")
+        if not inputs:
             return dict(self.columns)
-        same = dict(self.columns)
-        if "f" in values:
-            del same["omega"]
-            if "omega" in values:
-                same["omega"] = self.columns["omega"]  # both are given: refused with the inputs
-        for name, column in same.items():
-            if name in values:
-                continue
-            if np.unique(column).size > 1:
-                inputs_text = ", ".join(values)
-                raise InputError(
-                    name,
-                    f"{inputs_text} alone",
-                    f"given beside {inputs_text}: it differs between the points",
-                )
-            values[name] = float(column[0])
+        values = {name: to_si(name, value) for name, value in inputs.items()}
+        replaced = {*values, *(["omega"] if "f" in values else [])}
+        for name in [name for name in self.columns if name not in replaced]:
+            if np.unique(self.columns[name]).size > 1:
+                names = ", ".join(inputs)
+                bound = f"given beside {names}: it differs between the points"
+                raise InputError(name, f"{names} alone", bound)
+            values[name] = float(self.columns[name][0])
         return values
 
     # --- the model --------------------------------------------------------------------------------

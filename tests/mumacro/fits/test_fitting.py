@@ -183,8 +183,6 @@ def test_a_fit_predicts_at_other_inputs_by_name(surrogate: Surrogate) -> None:
     expected = surrogate.evaluate({**RIG, **new, **found.values}).mu_macro
     assert mu == close(np.asarray(expected), rel=1e-14)
     assert np.all(std > 0.0)
-    from_columns = found.predict({**new, "note": "dry"})
-    assert np.array_equal(from_columns.mu_macro, mu)
     assert isinstance(found.predict(v0=0.02).mu_macro, float)
 
 
