@@ -13,6 +13,7 @@ and each regime has one colour everywhere.
 
 import importlib
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -76,6 +77,7 @@ _MANY = 1000  # from this number on, cases on a map are drawn as small dots
 # weight of a label's distance to the border, relative to its distance to another line
 _TO_BORDER = 0.4
 _SIDE = 0.05  # part of the map at each side without labels
+_LEGEND_WIDTH = 72  # characters of a legend above its axes
 _ARROWS = 16  # number of arrows of the force along a path
 #: places where the map names the regime, as fractions of its width and height
 AREAS = ((0.14, 0.735), (0.8, 0.12))
@@ -231,48 +233,14 @@ def _axis(name: str) -> str:
     return f"{_SYMBOLS.get(name, name)} [{unit_of(name)}]"
 
 
-def _points(text: str, size: Any) -> float:
-    """Return the width of a text in points."""
-    properties = _loaded("font_manager").FontProperties(size=size)
-    measure = _loaded("textpath").text_to_path.get_text_width_height_descent
-    return float(measure(text, properties, ismath="$" in text)[0])
-
-
-def _room(ax: Any, last: Any = None) -> float:
-    """Return how wide a text above the axes may be, up to the right end of the ``last`` axes
-    [points]."""
-    boxes = []
-    for one in (ax, last or ax):
-        spec = one.get_subplotspec()  # with the room of a colour bar
-        boxes.append(one.get_position() if spec is None else spec.get_position(one.figure))
-    return float(72.0 * ax.figure.get_figwidth() * (boxes[1].x1 - boxes[0].x0))
-
-
-def _wrapped(text: str, width: float, size: Any) -> str:
-    """Return a text in lines of at most ``width`` points, broken after commas and semicolons."""
-    lines: list[str] = []
-    for line in text.split("\n"):
-        now = ""
-        for part in line.replace("; ", ";\0").replace(", ", ",\0").split("\0"):
-            longer = f"{now} {part}".lstrip()
-            if now and _points(longer, size) > width:
-                lines.append(now)
-                longer = part
-            now = longer
-        lines.append(now)
-    return "\n".join(lines)
-
-
-def head(ax: Any, title: str, legend: bool = True, last: Any = None) -> None:
+def head(ax: Any, title: str, legend: bool = True) -> None:
     """Write the title of axes in as many lines as it needs, and below it their legend, so that it
-    covers no curve.  Both extend up to the right end of the ``last`` axes."""
-    size = "medium"
+    covers no curve."""
     pad = 6.0
     handles, labels = ax.get_legend_handles_labels()
     if legend and labels:
+        columns = min(3, len(labels), max(1, _LEGEND_WIDTH // (max(map(len, labels)) + 6)))
         em = _loaded("font_manager").FontProperties(size="small").get_size_in_points()
-        widest = max(_points(label, "small") for label in labels) + 5.0 * em
-        columns = min(3, len(labels), max(1, int(_room(ax) // widest)))
         pad += 1.7 * em * -(-len(labels) // columns)
         ax.legend(
             handles,
@@ -285,7 +253,8 @@ def head(ax: Any, title: str, legend: bool = True, last: Any = None) -> None:
             borderpad=0.2,
         )
     if title:
-        ax.set_title(_wrapped(title, _room(ax, last), size), loc="left", fontsize=size, pad=pad)
+        unbroken = re.sub(r"(?<![,;]) ", "\N{NO-BREAK SPACE}", title)
+        ax.set_title(unbroken, loc="left", fontsize="medium", pad=pad, wrap=True)
 
 
 # --- curves of mu_macro ---------------------------------------------------------------------------
@@ -672,7 +641,7 @@ def plot_cycle(
     mean = float(np.sum((Fx[1:] + Fx[:-1]) * np.diff(share)) / 2.0)
     forces.axhline(mean, lw=0.8, color="C0", ls="--", label="mean of $F_x$")
     forces.set(xlabel="share of the period [-]", ylabel="force [N]", xlim=(0.0, 1.0))
-    head(forces, title, last=path)
+    head(forces, title)
     if path is not None:
         _draw_path(path, x, y, Fx, Fy)
     return forces

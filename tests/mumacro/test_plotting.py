@@ -13,7 +13,7 @@ from mumacro.fits.fitted import Fit
 from mumacro.inputs.fields import KINDS, Kind
 from mumacro.questions.law import Law
 from tests.support.cases import Case
-from tests.support.comparing import close
+from tests.support.comparing import close, title_of
 
 pyplot = pytest.importorskip("matplotlib.pyplot")
 pyplot.switch_backend("agg")
@@ -229,7 +229,7 @@ def test_an_interval_of_k_is_a_line_on_the_map(surrogate: Surrogate) -> None:
     for place, k in zip((places[0], places[-1]), ends, strict=True):
         one = surrogate.evaluate(**{**CASE, "k": k})
         assert place == close((one.v_tilde, one.y_tilde), rel=1e-12)
-    assert f"{answer.mu_macro_low:.4g} to {answer.mu_macro_high:.4g}" in axes.get_title(loc="left")
+    assert f"{answer.mu_macro_low:.4g} to {answer.mu_macro_high:.4g}" in title_of(axes)
 
 
 def test_a_million_cases_are_drawn_as_dots(surrogate: Surrogate) -> None:
@@ -265,7 +265,7 @@ def test_a_motion_names_its_amplitudes_and_phases_and_shows_every_arrow() -> Non
         .plot()
         .figure.axes
     )
-    title = forces.get_title(loc="left")
+    title = title_of(forces)
     for part in (
         "$x$: 0.1 mm, 3rd harmonic 20 µm at 45°",
         "$y$: 3 µm at 90°",

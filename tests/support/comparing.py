@@ -11,3 +11,8 @@ def close(expected: Any, *, rel: float = 0.0, abs: float = 0.0) -> Any:  # noqa:
     abs=1e-12."""
     assert rel > 0.0 or abs > 0.0, "state a tolerance"
     return pytest.approx(expected, rel=rel, abs=abs)
+
+
+def title_of(axes: Any) -> str:
+    """Return the title of axes, with plain spaces: lines are broken only between its parts."""
+    return str(axes.get_title(loc="left").replace("\N{NO-BREAK SPACE}", " "))

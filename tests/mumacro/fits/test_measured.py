@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate, closed_forms
-from tests.support.comparing import close
+from tests.support.comparing import close, title_of
 from tests.support.scripts import script
 
 pytest.importorskip("scipy")
@@ -118,7 +118,7 @@ def test_the_normal_force_obeys_the_published_form(surrogate: Surrogate, alpha: 
 def test_the_plot_of_points_with_their_own_mu0_is_one_smooth_curve_through_the_fit() -> None:
     result = measured.fitted("ball")
     axes = result.plot()
-    assert axes.get_title(loc="left").endswith(" N/m; ball, along")
+    assert title_of(axes).endswith(" N/m; ball, along")
     x, y = axes.get_lines()[-1].get_data()
     at_points = np.isin(x, measured.points().v0)
     assert y[at_points] == close(result.predict()[0], rel=1e-12)

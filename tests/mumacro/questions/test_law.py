@@ -18,7 +18,7 @@ from mumacro.inputs.fields import FIELDS, kind_of
 from mumacro.questions.law import law as friction_law
 from mumacro.questions.law import sweep_values
 from tests.support.cases import CASE, PAIRS, Case, as_kind, every_pair, without
-from tests.support.comparing import close
+from tests.support.comparing import close, title_of
 from tests.support.refusals import refused
 
 INTERVAL: Case = {"k_low": 0.8e6, "k_high": 1.2e6}
@@ -252,7 +252,7 @@ def test_the_picture_shows_band_and_borders(surrogate: Surrogate, pair: Any) -> 
     law, _, _ = law_of(surrogate, pair, INTERVAL, refine=True)
     axes = law.plot()
     k_title = plotting.case_title({"k": law.k_ends})
-    assert (" to " in k_title, k_title in axes.get_title(loc="left")) == (True, True)
+    assert (" to " in k_title, k_title in title_of(axes)) == (True, True)
     (band,) = axes.collections
     corners = band.get_paths()[0].vertices
     for x, *ends in zip(law.values, *law.band, strict=True):
