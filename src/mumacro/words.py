@@ -5,7 +5,7 @@ from typing import Any
 
 from mumacro.answer import Answer
 from mumacro.inputs.fields import MEASURED_AS, PER_UNIT, Kind
-from mumacro.inputs.units import Unit, choose_unit, format_number, known, suit_unit, tidy_zeros
+from mumacro.inputs.units import choose_unit, format_number, known, suit_unit, tidy_zeros
 from mumacro.outputs import MEMBERS
 from mumacro.results import Note, Rows
 from mumacro.validity import notes_of
@@ -24,17 +24,17 @@ _SHOWN = ("std", "std_share", "gradient")  # these are shown in their own rows
 
 
 def of_one_case(
-    answer: Answer[Any], shown: int | None = None, units: Mapping[str, str] | None = None
+    answer: Answer[Any], units: Mapping[str, str] | None = None
 ) -> tuple[Rows, Rows, str]:
     """Return three things: rows of name, value, unit and meaning; what the answer assumes and its
     remarks, each with its type; and the numerical error.
 
     Numbers have their significant digits, and the unit that ``units`` has for their input, or else
-    a suitable unit.  With ``shown`` they have this many digits, in SI.
+    a suitable unit.
     """
     kind, case = answer.cases.kind, answer.cases.columns
     said = notes_of(answer, units)
-    rows = _rows_of(answer, kind, shown, said.digits, units or {})
+    rows = _rows_of(answer, kind, said.digits, units or {})
     notes: Rows = [(one.word, in_words(one, kind, case).about) for one in said.notes]
     return rows, notes, f"numerical error  {answer.error_bound:.2g}"
 
@@ -58,22 +58,18 @@ def in_words(note: Note, kind: Kind, case: Mapping[str, Any]) -> Note:
 _UNIT_OF = {"limits.v0_crit": "v0", "groups.l0": "y0"}
 
 
-def _stiffness(k: float, shown: int | None, units: Mapping[str, str]) -> str:
+def _stiffness(k: float, units: Mapping[str, str]) -> str:
     """Return a stiffness that was given, or the middle of an interval."""
-    unit = choose_unit("k", k, units, shown)
-    return f"{tidy_zeros(format_number(k, unit, 6, shown))} {unit.symbol}"
+    unit = choose_unit("k", k, units)
+    return f"{tidy_zeros(format_number(k, unit, 6))} {unit.symbol}"
 
 
-def _rows_of(
-    answer: Any, kind: Kind, shown: int | None, count: int, units: Mapping[str, str]
-) -> Rows:
+def _rows_of(answer: Any, kind: Kind, count: int, units: Mapping[str, str]) -> Rows:
     """Return an answer as rows of name, value, unit, meaning."""
     surrogate, cases = answer._surrogate, answer.cases
     std = answer["std"] if "std" in answer.paths else 0.0
 
     def number(value: float, error: float = 0.0, deviation: float = 0.0) -> str:
-        if shown is not None:
-            return f"{value:#.{shown}g}"
         return known(value, count, error, deviation)
 
     error, mu0 = answer.error_bound, cases.columns["mu0"]
@@ -88,17 +84,16 @@ def _rows_of(
         ("source", answer.source, "", f"of {surrogate.id}, tolerance {surrogate.tolerance:g}"),
     ]
     if cases.ends is not None:
-        low, high = (_stiffness(float(end), shown, units) for end in cases.ends)
-        middle = _stiffness(cases.columns["k"], shown, units)
+        low, high = (_stiffness(float(end), units) for end in cases.ends)
+        middle = _stiffness(cases.columns["k"], units)
         least, most = (number(x, error) for x in (answer.mu_macro_low, answer.mu_macro_high))
         meaning = f"for k from {low} to {high}; {rows[0][1]} at {middle}, the geometric middle"
         rows[0] = ("mu_macro", f"{least} to {most}", "[-]", meaning)
     if "std" in answer.paths:
         shares = {name: answer[f"std_share.{name}"] for name in kind.fields}
         parts = ", ".join(f"{name} {100.0 * x:.3g} %" for name, x in shares.items() if x > 0.0)
-        deviation = known(std, 2) if shown is None else f"{std:.{shown}g}"
         meaning = f"standard deviation; {parts}" if parts else "standard deviation"
-        rows[0] = ("mu_macro", f"{rows[0][1]} ± {deviation}", "[-]", meaning)
+        rows[0] = ("mu_macro", f"{rows[0][1]} ± {known(std, 2)}", "[-]", meaning)
     for name, slope in (answer.gradient or {}).items():
         per = PER_UNIT[MEASURED_AS.get(name, name)]
         error = answer.gradient_bound[name]
@@ -109,11 +104,10 @@ def _rows_of(
         name, dot, member = path.partition(".")
         error = answer.outputs.get(f"{name}_bound{dot}{member}", 0.0)
         typed = _UNIT_OF.get(path, "")
-        si = MEMBERS[path].unit
         if typed in units:
-            unit = choose_unit(typed, value, units, shown)
+            unit = choose_unit(typed, value, units)
         else:
-            unit = suit_unit(si, value) if shown is None else Unit(si)
-        text = format_number(value, unit, count, shown, error)
+            unit = suit_unit(MEMBERS[path].unit, value)
+        text = format_number(value, unit, count, error)
         rows.append((path, text, f"[{unit.symbol}]", MEMBERS[path].meaning))
     return rows

@@ -169,10 +169,8 @@ def add_exponent(parser: OneLineParser) -> None:
 
 
 def add_form(parser: argparse.ArgumentParser) -> None:
-    """Add the options for the form of a result."""
-    parser.add_argument("--json", action="store_true", help="print JSON, with all digits")
-    text = "digits, in SI; default: those that are known, up to 6; 15: all"
-    parser.add_argument("--digits", type=int, choices=range(1, 18), metavar="N", help=text)
+    """Add the option for the form of a result."""
+    parser.add_argument("--json", action="store_true", help="print JSON, with all digits, in SI")
 
 
 def run(title: str, command: Callable[[Any], int | str], arguments: Any) -> int:

@@ -76,17 +76,17 @@ def run(words: Sequence[str]) -> str:
         for name, column in result.points.items()
     }
     columns |= {"mu_macro fitted": result.points["mu_macro"] - result.residuals}
-    text = _text(result, options.digits)
+    text = _text(result)
     return common.present(options, result, columns, text, surrogate, **plotting.OF_FIT)
 
 
-def _text(result: Fit, digit_count: int | None) -> str:
+def _text(result: Fit) -> str:
     """Return the text of the result: values with standard deviations and intervals, the scatter,
     other solutions, warnings."""
     rows: list[Sequence[str]] = []
     for name, value in result.values.items():
         off, (low, high) = result.std[name], result.interval[name]
-        form = f".{digit_count or digits(off / value if 0.0 < value < math.inf else 0.0)}g"
+        form = f".{digits(off / value if 0.0 < value < math.inf else 0.0)}g"
         number = "rigid" if math.isinf(value) else f"{value:{form}}"
         rows.append(
             (

@@ -71,35 +71,32 @@ def run(words: Sequence[str]) -> str:
     )
     columns = law.columns
     middle = float(law.values[law.values.size // 2])
-    count = law.digits if options.digits is None else options.digits
     units = case.units | common.unit_of_ends(along, ends)
-    unit = choose_unit(along, middle, units, options.digits)
+    unit = choose_unit(along, middle, units)
     of_k = ", for the geometric middle of k" if law.k_ends else ""
     notes = [
-        f"{c.name} at {along} = {format_quantity(c.value, unit, count, options.digits)}{of_k}"
+        f"{c.name} at {along} = {format_quantity(c.value, unit, law.digits)}{of_k}"
         for c in law.border
     ]
     notes += common.note_lines(law.notes)
     heads = [f"{name} [{unit_of(name)}]" if name in (along, "k") else name for name in columns]
     column_units = {along: unit}
     if law.stiffening is not None:
-        column_units["k"] = choose_unit("k", float(law.inputs["k"].max()), units, options.digits)
+        column_units["k"] = choose_unit("k", float(law.inputs["k"].max()), units)
     lines = notes
     if options.out is None:
-        table = _table(columns, column_units, count, options.digits)
+        table = _table(columns, column_units, law.digits)
         lines = [common.case_line(case, kind), table, *notes]
     in_si = dict(zip(heads, columns.values(), strict=True))
     return common.present(options, law, in_si, "\n".join(lines), surrogate)
 
 
-def _table(
-    columns: Mapping[str, Any], units: Mapping[str, Unit], count: int, digits: int | None
-) -> str:
+def _table(columns: Mapping[str, Any], units: Mapping[str, Unit], count: int) -> str:
     """Return the columns of a law as text; a column with a unit is in this unit, and ``source`` is
     left out."""
     cells = {
         f"{name} [{units[name].symbol}]" if name in units else name: [
-            _cell(x, name, units.get(name), count, digits, error)
+            _cell(x, name, units.get(name), count, error)
             for x, error in zip(column, columns["error_bound"], strict=True)
         ]
         for name, column in columns.items()
@@ -108,18 +105,14 @@ def _table(
     return in_columns([[*cells], *zip(*cells.values(), strict=True)])
 
 
-def _cell(
-    value: Any, name: str, unit: Unit | None, count: int, digits: int | None, error: float
-) -> str:
+def _cell(value: Any, name: str, unit: Unit | None, count: int, error: float) -> str:
     """Return a cell: a text, or a number with its significant digits."""
     if isinstance(value, str):
         return value
     if math.isnan(value):
         return "-"
     if unit is not None:
-        return tidy_zeros(format_number(value, unit, 6, digits))
+        return tidy_zeros(format_number(value, unit, 6))
     if name == "error_bound":
-        return f"{value:.{digits or 2}g}"
-    if digits is not None:
-        return f"{value:.{digits}g}"
+        return f"{value:.2g}"
     return tidy_zeros(known(value, count, error))

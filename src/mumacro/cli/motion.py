@@ -8,7 +8,7 @@ from mumacro import plotting
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, TypedCase, UsageError, in_columns, read_case
 from mumacro.inputs.fields import in_help, kind_of
-from mumacro.inputs.units import Unit, format_number, suit_unit
+from mumacro.inputs.units import format_number, suit_unit
 from mumacro.motions.motion import NUMBERS, PARTS, Motion
 from mumacro.motions.motion import motion as steady_cycle
 from mumacro.motions.oscillation import read_oscillation
@@ -82,7 +82,7 @@ def run(words: Sequence[str]) -> str:
         **case.inputs, **parts, contact=options.contact, tolerance=options.tolerance
     )
     rows = [
-        (name, *_shown(name, getattr(motion, name), unit, motion, options.digits), meaning)
+        (name, *_shown(name, getattr(motion, name), unit, motion), meaning)
         for name, (unit, meaning) in NUMBERS.items()
         if name != "error_estimate"
     ]
@@ -94,13 +94,11 @@ def run(words: Sequence[str]) -> str:
     return common.present(options, motion, columns, text, **plotting.OF_CYCLE)
 
 
-def _shown(
-    name: str, value: float, unit: str, motion: Motion, digits: int | None
-) -> tuple[str, str]:
+def _shown(name: str, value: float, unit: str, motion: Motion) -> tuple[str, str]:
     """Return a number with the digits that its error estimate allows, and its unit."""
     share = {"mu_macro": 1.0, "mu_lateral": 1.0}
     if name == "power_drive" and motion.mu_macro:  # mu_macro Fz v0
         share[name] = abs(value / motion.mu_macro)
     error = motion.error_estimate * share.get(name, 0.0)
-    shown = suit_unit(unit, value) if digits is None else Unit(unit)
-    return format_number(value, shown, 6, digits, error), f"[{shown.symbol}]"
+    shown = suit_unit(unit, value)
+    return format_number(value, shown, 6, error), f"[{shown.symbol}]"

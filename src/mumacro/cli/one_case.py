@@ -31,6 +31,6 @@ def run(words: Sequence[str], description: str) -> str:
     if options.json:
         model = {"model": rows_of(answer)} if options.model else {}
         return as_json({**answer.to_dict(), **model}, surrogate)
-    rows, notes, error = words_of_one_case(answer, options.digits, case.units)
+    rows, notes, error = words_of_one_case(answer, case.units)
     line = common.case_line(case, kind)
     return "\n".join([line, in_columns(rows), *([in_columns(notes)] if notes else []), error])

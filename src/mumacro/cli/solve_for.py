@@ -107,17 +107,16 @@ def run(words: Sequence[str]) -> str:
     rows = [(k, root) for k, one in solutions.items() for root in one.roots[0]]
     if not rows:
         raise ImpossibleError(solution.reason() + common.other_meaning(options, case, solution))
-    count = solution.digits if options.digits is None else options.digits
     units = case.units | common.unit_of_ends(unknown, between)
-    unit = choose_unit(unknown, rows[0][1].value, units, options.digits)
-    k_unit = choose_unit("k", rows[-1][0], units, options.digits) if solution.ends else None
+    unit = choose_unit(unknown, rows[0][1].value, units)
+    k_unit = choose_unit("k", rows[-1][0], units) if solution.ends else None
     without = [
         f"no {unknown} gives that for k = {k:.6g} N/m"
         for k, one in solutions.items()
         if not one.roots[0]
     ]
     ranges = [solution.reason()] if solution.roots[0] and solution.reason() else []
-    table = _table(unknown, rows, unit, k_unit, count, options.digits)
+    table = _table(unknown, rows, unit, k_unit, solution.digits)
     notes = common.note_lines(solution.notes)
     text = "\n".join([common.case_line(case, kind), table, *ranges, *without, *notes])
     heads = _heads(f"{unknown} [{solution.unit}]", "k [N/m]" if solution.ends else None)
@@ -140,12 +139,11 @@ def _table(
     unit: Unit,
     k_unit: Unit | None,
     count: int,
-    digits: int | None,
 ) -> str:
     """Return the roots as text, with their k if it is an interval."""
     table = [_heads(f"{unknown} [{unit.symbol}]", k_unit and f"k [{k_unit.symbol}]")]
     for k, root in rows:
-        of_k = [tidy_zeros(format_number(k, k_unit, 6, digits))] if k_unit else []
-        values = [format_number(x, unit, count, digits) for x in (root.value, root.low, root.high)]
+        of_k = [tidy_zeros(format_number(k, k_unit, 6))] if k_unit else []
+        values = [format_number(x, unit, count) for x in (root.value, root.low, root.high)]
         table.append([*of_k, *values, f"{root.mu_macro:.{count}g}", root.regime])
     return in_columns(table)

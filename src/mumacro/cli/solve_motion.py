@@ -9,7 +9,7 @@ from mumacro.cli.common import ImpossibleError, UsageError, in_columns
 from mumacro.cli.motion import read_motion
 from mumacro.inputs.case import read
 from mumacro.inputs.fields import quantity_of
-from mumacro.inputs.units import Unit, format_number, parse_unit, suit_unit, tidy_zeros
+from mumacro.inputs.units import Unit, format_number, known, parse_unit, suit_unit, tidy_zeros
 from mumacro.motions.motion import PARTS
 from mumacro.motions.solve_motion import MotionSolution, solve_motion
 
@@ -39,29 +39,25 @@ def run(options: argparse.Namespace) -> str:
     (roots,) = solution.roots
     if not roots:
         raise ImpossibleError(solution.reason() + common.other_meaning(options, case, solution))
-    unit = _unit_of_roots(solution, within or (), options.digits)
+    unit = _unit_of_roots(solution, within or ())
     names = ("between", "and", "mu_macro [-]")
     table = [[f"{unknown} [{unit.symbol}]", *names]]
     for root in roots:
         width = root.high - root.low
-        cells = [format_number(root.value, unit, 6, options.digits, width)]
-        cells += [format_number(x, unit, 6, options.digits) for x in (root.low, root.high)]
-        mean = format_number(root.mean, Unit("-"), 6, options.digits, root.error_estimate)
-        table.append([*cells, mean if options.digits else tidy_zeros(mean)])
+        cells = [format_number(root.value, unit, 6, width)]
+        cells += [format_number(x, unit, 6) for x in (root.low, root.high)]
+        table.append([*cells, tidy_zeros(known(root.mean, 6, root.error_estimate))])
     text = "\n".join([line, in_columns(table), *filter(None, [solution.reason()])])
     heads = (f"{unknown} [{solution.unit}]", *names)
     columns = dict(zip(heads, zip(*(root[:4] for root in roots), strict=True), strict=True))
     return common.present(options, solution, columns, text if options.out is None else "")
 
 
-def _unit_of_roots(solution: MotionSolution, typed: Sequence[str], digits: int | None) -> Unit:
+def _unit_of_roots(solution: MotionSolution, typed: Sequence[str]) -> Unit:
     """Return the unit in which the roots are printed."""
-    si, (first, *_) = solution.unit, solution.roots[0]
-    if digits is not None:
-        return Unit(si)
     quantity = quantity_of(solution.unknown)
     for text in typed:
         symbol = read(solution.unknown, text, quantity).unit
         if symbol is not None and (unit := parse_unit(quantity, symbol)) is not None:
             return unit
-    return suit_unit(si, first.value)
+    return suit_unit(solution.unit, solution.roots[0][0].value)

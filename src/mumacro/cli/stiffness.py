@@ -13,7 +13,6 @@ from mumacro.stiffness import (
     GEOMETRIES,
     INSTEAD,
     MATERIALS,
-    NUMBERS,
     Material,
     contact_of,
 )
@@ -86,10 +85,7 @@ def run(words: Sequence[str]) -> str:
     contact = contact_of(options.geometry, **arguments)
     if options.json:
         return as_json({"geometry": options.geometry, **contact.to_dict()})
-    form = f".{options.digits or 4}g"  # materials and geometry give no more digits
-    rows = [
-        (name, f"{contact.columns[name]:{form}}", f"[{unit}]") for name, unit in NUMBERS.items()
-    ]
     option = "" if contact.contact == "spring" else f" --contact {contact.contact}"
-    rows += [("contact", contact.contact, ""), ("paste", f"k={contact.k:{form}}{option}", "")]
+    rows = contact._rows()  # with four digits, as materials and geometry give no more
+    rows += [("contact", contact.contact), ("paste", f"k={contact.k:.4g}{option}")]
     return "\n".join([in_columns(rows), *(note.line for note in contact.notes)])

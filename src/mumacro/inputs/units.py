@@ -565,40 +565,30 @@ def known(value: float, digits: int, error: float = 0.0, deviation: float = 0.0)
     return f"{rounded:#.{count}g}".removesuffix(".")
 
 
-def choose_unit(
-    name: str, value: float, typed: Mapping[str, str], digits: int | None = None
-) -> Unit:
+def choose_unit(name: str, value: float, typed: Mapping[str, str]) -> Unit:
     """Return the unit in which an input is shown: the unit that was typed, or a suitable one for a
-    value [SI].  With a number of ``digits`` return the SI unit.
+    value [SI].
 
     >>> choose_unit("y0", 2e-6, {}).symbol, choose_unit("y0", 2e-6, {"y0": "mm"}).symbol
     ('um', 'mm')
     """
-    if digits is not None:
-        return Unit(unit_of(name))
     parsed = parse_unit(quantity_of(name), typed[name]) if name in typed else None
     return parsed or suit_unit(unit_of(name), value)
 
 
-def format_number(
-    value: float, unit: Unit, count: int, digits: int | None = None, error: float = 0.0
-) -> str:
+def format_number(value: float, unit: Unit, count: int, error: float = 0.0) -> str:
     """Return a value [SI] as a number of a unit, with ``count`` digits, or fewer if its ``error``
-    does not support them; or with ``digits``."""
-    if digits is not None:
-        return f"{value:.{digits}g}"
+    does not support them."""
     return known(unit.scale.of_si(value), count, unit.scale.of_si(error))
 
 
-def format_quantity(value: float, unit: Unit, count: int, digits: int | None = None) -> str:
+def format_quantity(value: float, unit: Unit, count: int) -> str:
     """Return the number with the unit.
 
     >>> format_quantity(2.4547623e-6, suit_unit("m", 2.4547623e-6), 4)
     '2.455 um'
-    >>> format_quantity(2.4547623e-6, Unit("m"), 4, digits=8)
-    '2.4547623e-06 m'
     """
-    return f"{format_number(value, unit, count, digits)} {unit.symbol}"
+    return f"{format_number(value, unit, count)} {unit.symbol}"
 
 
 def tidy_zeros(text: str) -> str:

@@ -165,10 +165,6 @@ class Element:
             raise InputError("state", forces, "finite")
         self._forces = array.reshape(self._forces.shape).copy()
 
-    def reset(self) -> None:
-        """Relax all springs, so that their forces are zero."""
-        self._forces[...] = 0.0
-
     def __repr__(self) -> str:
         springs = f", {self.springs} springs" if self.contact == "ball" else ""
         if self.shape:
