@@ -209,7 +209,13 @@ class Admission:
         self._count(client, is_long, -1)
         if seconds is not None:
             self._seconds += 0.1 * (seconds - self._seconds)
-        while ready := [one for one in self.queue if self._is_room(one.client, one.is_long)]:
+        while self.queue and self.slots < self.settings.max_computations:
+            first: dict[tuple[str, bool], _Waiting] = {}  # of each client and kind, the oldest first
+            for one in self.queue:
+                first.setdefault(one[:2], one)
+            ready = [one for kind, one in first.items() if self._is_room(*kind)]
+            if not ready:
+                break
             one = min(ready, key=lambda waiting: self._slots_of[waiting.client])
             self.queue.remove(one)
             self._count(one.client, one.is_long, 1)
