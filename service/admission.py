@@ -210,7 +210,7 @@ class Admission:
         if seconds is not None:
             self._seconds += 0.1 * (seconds - self._seconds)
         while self.queue and self.slots < self.settings.max_computations:
-            first: dict[tuple[str, bool], _Waiting] = {}  # of each client and kind, the oldest first
+            first: dict[tuple[str, bool], _Waiting] = {}  # the oldest of each client
             for one in self.queue:
                 first.setdefault(one[:2], one)
             ready = [one for kind, one in first.items() if self._is_room(*kind)]

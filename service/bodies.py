@@ -263,17 +263,11 @@ class HeadAsGet:
             await self._app(scope, receive, send)
             return
 
-        closes = False
-
         async def send_head(message: Message) -> None:
-            nonlocal closes
             if message["type"] == "http.response.start":
-                closes = (b"connection", b"close") in message["headers"]
                 await send(message)
-                if not closes:  # at once, because the client may already send its next request
-                    await send({"type": "http.response.body", "body": b""})
-            elif closes:  # when the rest of the request has been read
-                await send({**message, "body": b""})
+                # at once, because the client may already send its next request
+                await send({"type": "http.response.body", "body": b""})
 
         await self._app({**scope, "method": "GET"}, receive, send_head)
 

@@ -6,12 +6,11 @@ detail, instance`` and the request id.  For bad fields it has ``errors`` with a 
 reported at once.  A user never sees a traceback.
 """
 
-import asyncio
 import json
 import logging
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NoReturn
@@ -39,9 +38,6 @@ _NO_VALUE = object()
 CLOSE = {"Connection": "close"}
 # the members of the objects within a body
 _WITHIN = dict.fromkeys(PARTS, ("harmonic", "amplitude", "phase"))
-# limits of time and bytes for reading a refused body
-_LINGER_S, _LINGER = 5.0, 32 * 1024 * 1024
-_PAUSE_S = 1.0  # a client that sends nothing for this time has read the answer
 _log = logging.getLogger("mumacro.error")
 
 
@@ -431,53 +427,6 @@ def problem_of(error: RequestError, scope: Scope) -> Response:
     )
 
 
-def answer_to(error: Exception, scope: Scope) -> ASGIApp:
-    """Return the answer to a request that ended with an exception."""
-    request_error = meaning(error, scope)
-    answer = problem_of(request_error, scope)
-    is_slow = request_error.kind in (ProblemKind.SLOW_CLIENT, ProblemKind.TOOK_TOO_LONG)
-    closes = "Connection" in request_error.kind.headers
-    names = {name for name, _ in scope["headers"]}
-    has_body = not {b"content-length", b"transfer-encoding"}.isdisjoint(names)
-    if closes and has_body and not is_slow and b"expect" not in names:
-        return _BeforeRest(answer)
-    return answer
-
-
-class _BeforeRest:
-    """Send an answer to a client that may still be sending its body.
-
-    The rest of the body is read and dropped for a while before the connection is closed.  Otherwise
-    many clients see a reset and no reason.
-    """
-
-    def __init__(self, answer: Response) -> None:
-        self._answer = answer
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send the answer, which has a Content-Length, and drop the rest of the body.  Only then
-        end the answer, so that the server closes the connection."""
-
-        async def send_unended(message: Message) -> None:
-            if message["type"] == "http.response.body":
-                message["more_body"] = True
-            await send(message)
-
-        await self._answer(scope, receive, send_unended)
-        await _drop_body(receive)
-        await send({"type": "http.response.body", "body": b""})
-
-
-async def _drop_body(receive: Receive) -> None:
-    count, unfinished = 0, True
-    with suppress(TimeoutError):
-        async with asyncio.timeout(_LINGER_S):
-            while unfinished and count < _LINGER:
-                message = await asyncio.wait_for(receive(), _PAUSE_S)
-                count += len(message.get("body", b""))
-                unfinished = message.get("more_body", False)
-
-
 class Failures:
     """Convert every exception to a problem document (middleware); an unexpected one goes to the
     log."""
@@ -506,10 +455,10 @@ class Failures:
             if has_begun:  # end the connection without the end of the answer
                 raise ClientDisconnect from error
             try:
-                answer = answer_to(error, scope)
+                answer = problem_of(meaning(error, scope), scope)
             except Exception as fault:  # such as a detail that JSON cannot hold
                 _log_unexpected(fault, scope)
-                answer = answer_to(fault, scope)
+                answer = problem_of(meaning(fault, scope), scope)
             await answer(scope, receive, send)
 
 

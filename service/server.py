@@ -27,6 +27,9 @@ _MARGIN_S = 2.0
 _LOOK_EVERY_S = 0.25  # seconds between two checks whether the time of a connection is over
 # how long the answer to a client that has closed its side may take to begin
 _CLOSED_SIDE_S = 5.0
+# limits of time and bytes for dropping the rest of a body after its answer, and the time without a
+# byte after which the client has read the answer
+_DROP_S, _DROP, _PAUSE_S = 5.0, 32 * 1024 * 1024, 1.0
 _TOO_LARGE = RequestError(
     ProblemKind.HEAD_TOO_LARGE, f"a head may have up to {MAX_FIELDS} fields and {MAX_HEAD} bytes"
 )
@@ -46,14 +49,14 @@ class _Transport:
     """Send the headers of an answer together with the data that follow immediately: one packet, not
     two."""
 
-    def __init__(self, transport: Any, loop: Any) -> None:
-        self._transport, self._loop, self._pending = transport, loop, b""
+    def __init__(self, transport: Any, connection: "Connection") -> None:
+        self._transport, self._connection, self._pending = transport, connection, b""
         self.is_closing = transport.is_closing
 
     def write(self, data: bytes) -> None:
         """Keep the first piece until the next one, or until the loop continues."""
         if not self._pending:
-            self._loop.call_soon(self.flush)
+            self._connection.loop.call_soon(self.flush)
             self._pending = data
         else:
             self.flush(data)
@@ -65,9 +68,13 @@ class _Transport:
             self._transport.write(head + data)
 
     def close(self) -> None:
-        """Close when everything is sent."""
+        """Close when everything is sent.  If the rest of a body is still to come, close this side
+        only: a client that is reset while it sends may lose the answer."""
         self.flush()
-        self._transport.close()
+        if self._connection.drops():
+            self._transport.write_eof()
+        else:
+            self._transport.close()
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._transport, name)
@@ -79,8 +86,9 @@ class Connection(HttpToolsProtocol):
 
     A request to upgrade the connection to another protocol is answered as if it did not ask for it
     (RFC 9110, 7.8).  A second request that arrives before the first is answered is dropped, and the
-    connection closes after the answer.  If all connections are open, a new one replaces the one
-    that has waited longest for a request.
+    connection closes after the answer.  The rest of a body that was answered before it was complete
+    is dropped for a while.  If all connections are open, a new one replaces the one that has waited
+    longest for a request.
     """
 
     #: connections without a request; the one that has waited longest is the first
@@ -88,7 +96,7 @@ class Connection(HttpToolsProtocol):
     # times by which the client must have moved, and the answer must be complete
     _due = _end = math.inf
     _bytes = 0  # bytes since the last answer
-    _in_head = _second = False
+    _in_head = _second = _drops = False
     _refusal: RequestError | None = None
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
@@ -162,10 +170,19 @@ class Connection(HttpToolsProtocol):
             self.cycle.disconnected = True
         self.transport.abort()
 
+    def drops(self) -> bool:
+        """Return whether the rest of a body will be dropped before the connection closes."""
+        if self._drops or self._in_head or self._busy or self.cycle is None:
+            return False
+        self._drops, now = self.cycle.more_body, self.loop.time()
+        self.cycle.body.clear()
+        self._due, self._end, self._bytes = now + _PAUSE_S, now + _DROP_S, 0
+        return self._drops
+
     def connection_made(self, transport: Any) -> None:
         """Make room, and wait for a request."""
         super().connection_made(transport)
-        self.transport: Any = _Transport(transport, self.loop)
+        self.transport: Any = _Transport(transport, self)
         self._admission.connections = self.connections.__len__
         if len(self.connections) > self._settings.max_connections and self.waiting:
             oldest = next(iter(self.waiting))
@@ -201,10 +218,15 @@ class Connection(HttpToolsProtocol):
 
     def data_received(self, data: bytes) -> None:
         """Read bytes, unless they follow a request that is not answered yet."""
-        start = 0
+        if self._drops:
+            self._due, self._bytes = self.loop.time() + _PAUSE_S, self._bytes + len(data)
+            if self._bytes > _DROP:
+                self.transport.abort()
+            return
+        start, whole = 0, memoryview(data)  # whose pieces are no copies
         while start < len(data) and not self._second and not self.transport.is_closing():
             stop = len(data) if self._busy and not self._in_head else start + _PIECE
-            piece = data[start:stop]
+            piece = whole[start:stop]
             start, self._bytes = stop, self._bytes + len(piece)
             self._feed(piece)
             # also after a body
@@ -215,7 +237,7 @@ class Connection(HttpToolsProtocol):
         if self._in_head or not self._busy or (self.cycle.more_body and not in_batch):
             self._watch()
 
-    def _feed(self, data: bytes) -> None:
+    def _feed(self, data: bytes | memoryview) -> None:
         """Read bytes; refuse what the parser, or a limit here, refuses."""
         try:
             self.parser.feed_data(data)
@@ -225,7 +247,7 @@ class Connection(HttpToolsProtocol):
                 self._refuse(self._refusal or fault)
         except httptools.HttpParserUpgrade as upgrade:
             if self._upgrades:
-                self._read_without_upgrade(data[upgrade.args[0] :])
+                self._read_without_upgrade(bytes(data[upgrade.args[0] :]))
 
     @property
     def _upgrades(self) -> bool:
@@ -299,9 +321,10 @@ class Connection(HttpToolsProtocol):
         self.server_state.total_requests += 1
         if not self.transport.is_closing():
             self.flow.resume_reading()
-            self._due, self._end, self._bytes = (
-                self.loop.time() + self._settings.keep_alive_s,
-                math.inf,
-                0,
-            )
+            if not self._drops:
+                self._due, self._end, self._bytes = (
+                    self.loop.time() + self._settings.keep_alive_s,
+                    math.inf,
+                    0,
+                )
             self.waiting[self] = None
