@@ -294,6 +294,8 @@ class Ticket:
             thread = Thread(work, _NICENESS if cost > LONG else 0)
         except RuntimeError:
             raise RequestError(ProblemKind.OVERLOADED, "no thread can start") from None
+        if started >= admission.stops_at:  # it waited for its slot until the end
+            thread.stop.set()
         admission.running.add(thread)
         thread.done.add_done_callback(lambda _: admission.running.discard(thread))
         gone = asyncio.ensure_future(_gone(receive))

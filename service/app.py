@@ -70,7 +70,7 @@ _LOOK_EVERY_S = 1.0  # seconds between two measurements of what the process hold
 # A thread that computes in Python keeps the other threads waiting for this time, including the
 # loop.  With Python's default of 5 ms a probe waited five times as long while 200 batches ran
 # (docs/operations.md).
-_SWITCH_S = 0.0005
+_SWITCH_S = 0.0002
 # For glibc: number of an option in malloc.h -> its value.  A freed block of at least 4 MiB goes
 # back to the system, and so does the free end of a heap above 16 MiB; all threads have one heap.
 # glibc's own limits grow with the size of freed blocks, and each thread has a heap: so six batches

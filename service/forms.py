@@ -81,9 +81,11 @@ def read(text: bytearray, max_batch: int, words: Mapping[str, Any]) -> Body:
         if not _OPENS_LIST.match(text):
             return Body(decode_columns(text, _NUMBERS, _REST))
         columns = decode_rows(text, _NUMBERS, _WORDS)
-        _check_names(columns, words)
-        return Body(columns, rows=True)
-    except (*NotRead, InputError):
+        kind = (columns[name][0] if name in columns else None for name in KIND)
+        if not isinstance(_targets_of(words, (*columns,), *kind), Reason):
+            return Body(columns, rows=True)
+        values = decode_batch(text)  # each row gets the reason
+    except NotRead:
         if count(text, b":") > _KNOWN * objects + 64:
             detail = "the body has objects with more members than there are fields"
             raise RequestError(ProblemKind.INVALID_VALUE, detail) from None
@@ -95,12 +97,6 @@ def read(text: bytearray, max_batch: int, words: Mapping[str, Any]) -> Body:
     if not isinstance(values, dict):
         refuse([FieldFault((), "must be an object of columns or a list of rows", values)])
     return Body(values)
-
-
-def _check_names(columns: Mapping[str, Any], words: Mapping[str, Any]) -> None:
-    """Raise InputError if the names of the rows do not form a case."""
-    ones = {name: column[:1] if name in KIND else np.ones(2) for name, column in columns.items()}
-    Cases.of(named(None, {**ones, **words}))
 
 
 def _one_by_one(rows: list[Any], words: Mapping[str, Any]) -> Body:

@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -293,14 +294,20 @@ def test_a_search_ends_with_its_limit_or_its_client(serving: Any) -> None:
         assert not server.errors()
 
 
-def test_a_stop_ends_long_work_with_an_answer(serving: Any) -> None:
-    with serving(MUMACRO_SHUTDOWN_GRACE_S="1") as server, connect(server) as raw:
-        raw.sendall(posted("/v1/solve-for", SEARCH))
+@pytest.mark.parametrize("grace_s", [0, 1])
+def test_a_stop_ends_long_work_with_an_answer(serving: Any, grace_s: int) -> None:
+    """Also the work that waits for the slot of another one."""
+    settings = {"MUMACRO_SHUTDOWN_GRACE_S": str(grace_s), "MUMACRO_MAX_COMPUTATIONS": "2"}
+    with serving(**settings) as server, ExitStack() as stack:
+        connections = [stack.enter_context(connect(server)) for _ in range(2)]
+        for raw in connections:
+            raw.sendall(posted("/v1/solve-for", SEARCH))
         time.sleep(0.5)
         assert server.stop() == 0
-        answer = to_end(raw)
-    assert answer.startswith(b"HTTP/1.1 503")
-    assert b"the service stops" in answer
+        answers = [to_end(raw) for raw in connections]
+    for answer in answers:
+        assert answer.startswith(b"HTTP/1.1 503")
+        assert b"the service stops" in answer
 
 
 def test_a_file_system_that_hangs_stops_nobody_else(
