@@ -4,7 +4,8 @@ attributes."""
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from contextlib import suppress
+from typing import Any
 
 import numpy as np
 
@@ -29,14 +30,6 @@ _PLAIN = ("builtins", "numpy", "polars", "pyarrow", "dask")
 def library(value: Any) -> str:
     """Return the name of the package that defines the type of a value."""
     return type(value).__module__.partition(".")[0]
-
-
-class Plain(NamedTuple):
-    """Hold the numbers of a value with a unit, and its scale to SI."""
-
-    numbers: Any
-    scale: Scale
-    unit: str  #: symbol in the table of units
 
 
 def carried_unit(value: Any) -> Any:
@@ -90,36 +83,19 @@ def _unit_of_quantity(value: Any) -> Any:
     return None
 
 
-def without_carried_unit(name: str, value: Any, unit: Any, quantity: str) -> Plain:
-    """Return the numbers of a value whose ``unit`` comes from :func:`carried_unit`.
+def read_unit(name: str, unit: Any, quantity: str, value: Any = None) -> Unit:
+    """Return a unit from :func:`carried_unit`, with its scale.
 
-    Raise InputError for a unit that the input cannot have.
-    """
-    text = _text_of(unit)
-    parsed = parse_unit(quantity, text) or parse_unit(quantity, str(unit))
-    if parsed is None:
-        si = _converted(value, text, QUANTITIES[quantity].unit, quantity)
-        if si is None:
-            raise InputError(name, _shown(value, text), _bound(quantity, value, text))
-        parsed, value = Unit(canonical(text)), si
-    return Plain(_numbers(value), parsed.scale, parsed.symbol)
-
-
-def scale_of_carried(name: str, unit: Any, quantity: str) -> Scale:
-    """Return the scale of a unit from :func:`carried_unit`, without reading the numbers.
-
-    Raise InputError for a unit that the input cannot have.
+    Raise InputError for a unit that the input cannot have; the message shows the ``value``.
     """
     text = _text_of(unit)
     parsed = parse_unit(quantity, text) or parse_unit(quantity, str(unit))
     if parsed is not None:
-        return parsed.scale
-    one = None
-    if not isinstance(unit, str):
-        one = _converted(1.0 * unit, text, QUANTITIES[quantity].unit, quantity)
-    if one is None:
-        raise InputError(name, _shown(None, text), _bound(quantity, None, text))
-    return Scale(float(_magnitude(one)))
+        return parsed
+    scale = _scale_by_library(unit, text, quantity)
+    if scale is None:
+        raise InputError(name, _shown(value, text), _bound(quantity, value, text))
+    return Unit(canonical(text), Scale(scale))
 
 
 def labelled_in_si(name: str, column: Any, quantity: str, scale: Scale | None = None) -> Any:
@@ -130,7 +106,7 @@ def labelled_in_si(name: str, column: Any, quantity: str, scale: Scale | None = 
     """
     unit = carried_unit(column)
     if unit is not None:
-        carried = scale_of_carried(name, unit, quantity)
+        carried = read_unit(name, unit, quantity).scale
         if scale is not None and carried != scale:
             raise two_units(name, _text_of(unit))
         scale = carried
@@ -180,7 +156,7 @@ def _magnitude(value: Any) -> Any:
     return np.asarray(value)
 
 
-def _numbers(value: Any) -> Any:
+def numbers_in(value: Any) -> Any:
     """Return the numbers of a value with a unit, without labels and unit."""
     package = library(value)
     if package == "pandas":
@@ -188,7 +164,7 @@ def _numbers(value: Any) -> Any:
         return _magnitude(array.quantity) if hasattr(array, "quantity") else array
     if package == "xarray":
         data = value.data
-        return np.asarray(data) if _unit_of_quantity(data) is None else _numbers(data)
+        return np.asarray(data) if _unit_of_quantity(data) is None else numbers_in(data)
     if hasattr(value, "attrs") or package == "netCDF4":  # an array in a file
         return value[...]
     return _magnitude(value.quantity if package == "pint_pandas" else value)
@@ -204,32 +180,32 @@ def _text_of(unit: Any) -> str:
         return str(unit)
 
 
-def _converted(value: Any, text: str, unit: str, quantity: str) -> Any:
-    """Return a quantity after its own library has converted it to an SI unit, or None if this is
+def _scale_by_library(unit: Any, text: str, quantity: str) -> float | None:
+    """Return the size of a unit in SI after its own library has converted it, or None if this is
     impossible.
 
     For a frequency libraries take a radian, and a turn, as a plain 1, which is wrong by a factor of
     2 pi.
     """
-    if not hasattr(value, "to") or is_level(text):
-        return None
     turns = any(word in text.lower() for word in _ANGLES)
     hertz = "hz" in text.lower() or "hertz" in text.lower()
-    if quantity in ("angular frequency", "angle") and (hertz or not turns):
+    if (
+        isinstance(unit, str)
+        or is_level(text)
+        or (quantity in ("angular frequency", "angle") and (hertz or not turns))
+        or (quantity == "frequency" and turns)
+    ):
         return None
-    if quantity == "frequency" and turns:
-        return None
-    for target in (unit, "dimensionless", "") if unit == "-" else (unit,):
-        try:
-            return value.to(target)
-        except Exception:  # noqa: S112 (each library has errors of its own)
-            continue
+    si = QUANTITIES[quantity].unit
+    for target in (si, "dimensionless", "") if si == "-" else (si,):
+        with suppress(Exception):  # each library has errors of its own
+            return float(_magnitude((1.0 * unit).to(target)))
     return None
 
 
 def _bound(quantity: str, value: Any, unit: str) -> str:
     try:
-        number = float(_numbers(value))
+        number = float(numbers_in(value))
     except (TypeError, ValueError):
         number = math.nan
     if math.isnan(number):
@@ -240,6 +216,6 @@ def _bound(quantity: str, value: Any, unit: str) -> str:
 def _shown(value: Any, unit: str) -> str:
     """Return a quantity as text for a message."""
     try:
-        return f"{float(_numbers(value)):.12g} {unit or 'without dimension'}"
+        return f"{float(numbers_in(value)):.12g} {unit or 'without dimension'}"
     except (TypeError, ValueError):
         return f"a value in {unit or 'no unit'}"

@@ -14,12 +14,13 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.carried import carried_unit, uncertain, without_carried_unit, without_mask
+from mumacro.inputs.carried import carried_unit, numbers_in, read_unit, uncertain, without_mask
 from mumacro.inputs.fields import GAP, STIFFNESS, is_rigid, quantity_of
 from mumacro.inputs.numbers import split_number, tidy
 from mumacro.inputs.units import (
     QUANTITIES,
     Scale,
+    Unit,
     canonical,
     explain_unit,
     parse_unit,
@@ -61,13 +62,13 @@ class Value(NamedTuple):
     text: str | None = None  #: the text, if the value was a text
     unit: str | None = None  #: the unit that was understood; None if the number is in SI
 
-    def scaled(self, name: str, scale: Scale, unit: str) -> "Value":
+    def scaled(self, name: str, unit: Unit) -> "Value":
         """Return the same numbers of an input, read in a unit."""
         si, std, low, high = (
-            None if part is None else _in_si(name, f"{part!r} {unit}", part, scale)
+            None if part is None else _in_si(name, f"{part!r} {unit.symbol}", part, unit.scale)
             for part in self[:4]
         )
-        return Value(si, std, low, high, self.text, unit)
+        return Value(si, std, low, high, self.text, unit.symbol)
 
 
 def read(name: str, value: Any, quantity: str = "") -> Value:
@@ -111,8 +112,8 @@ def read(name: str, value: Any, quantity: str = "") -> Value:
         return _of_text(name, quantity, str(value))
     unit = carried_unit(value)
     if unit is not None:
-        held = without_carried_unit(name, value, unit, quantity)
-        return read(name, held.numbers, quantity).scaled(name, held.scale, held.unit)
+        of_value = read_unit(name, unit, quantity, value)
+        return read(name, numbers_in(value), quantity).scaled(name, of_value)
     if (pair := uncertain(value)) is not None:
         return Value(*pair)
     plain = without_mask(value)

@@ -16,10 +16,10 @@ from mumacro.inputs.carried import (
     carried_unit,
     labelled_in_si,
     library,
-    scale_of_carried,
+    numbers_in,
+    read_unit,
     two_units,
     uncertain,
-    without_carried_unit,
     without_mask,
 )
 from mumacro.inputs.case import (
@@ -35,7 +35,7 @@ from mumacro.inputs.case import (
 )
 from mumacro.inputs.fields import GAP, is_rigid, quantity_of
 from mumacro.inputs.numbers import TOO_LARGE
-from mumacro.inputs.units import QUANTITIES, in_si, parse_unit, scale_of, too_large_in_si
+from mumacro.inputs.units import QUANTITIES, Unit, in_si, parse_unit, scale_of, too_large_in_si
 from mumacro.kernel.arrays import Array
 
 _FLOAT = np.dtype(np.float64)
@@ -124,9 +124,10 @@ def read_column(name: str, values: Any, quantity: str = "", unit: str = "") -> C
     scale = None if parsed is None else parsed.scale
     carried = carried_unit(values)
     if carried is not None:
-        if scale is not None and scale_of_carried(name, carried, quantity) != scale:
+        of_values = read_unit(name, carried, quantity)
+        if scale is not None and of_values.scale != scale:
             raise two_units(name, str(carried))
-        values, scale, unit = without_carried_unit(name, values, carried, quantity)
+        values, scale, unit = numbers_in(values), of_values.scale, of_values.symbol
     si, faults = _doubles(name, values, quantity)
     if scale is None:
         return Column(si, unit or None, faults)
@@ -184,7 +185,7 @@ def in_unit(name: str, value: Any, unit: str) -> Any:
         return read_column(name, value, quantity, unit)
     one = read(name, value, quantity)
     if one.unit is None:
-        return one.scaled(name, scale, unit)
+        return one.scaled(name, Unit(unit, scale))
     if scale_of(name, one.unit) != scale:
         raise two_units(name, one.unit)
     return one
