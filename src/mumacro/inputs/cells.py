@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from mumacro.inputs.fields import QUANTITY_OF, RIGID, is_rigid
-from mumacro.inputs.numbers import Signs, read_number, split_number, tidy
+from mumacro.inputs.numbers import NUMBER, Signs, read_number, tidy
 from mumacro.inputs.units import QUANTITIES, Scale, canonical, scale_of
 from mumacro.kernel.arrays import Array
 
@@ -145,10 +145,10 @@ def read_cell(name: str, cell: str, signs: Signs, scale: Scale = Scale()) -> flo
         if text[-1:] in "%‰" and QUANTITY_OF[name] == "ratio":  # a number, whatever the unit is
             number = read_number(text[:-1].strip(), signs.decimal)
             return number * scale.over / (scale.times * (100.0 if text[-1] == "%" else 1e3))
-        raise ValueError(_no_number(name, text, str(error), signs)) from None
+        raise ValueError(_no_number(name, text, str(error))) from None
 
 
-def _no_number(name: str, text: str, fault: str, signs: Signs) -> str:
+def _no_number(name: str, text: str, fault: str) -> str:
     """Return why a cell has no number."""
     if text.startswith("="):
         return "is a formula without a value: open it in its program, and save it"
@@ -158,11 +158,10 @@ def _no_number(name: str, text: str, fault: str, signs: Signs) -> str:
         return "must be one number; a deviation is a column std"
     if not text.strip("0123456789.,'’+-−eEdD \u00a0\u202f"):
         return fault  # such as a separator that is not the decimal one
-    try:
-        _, unit = split_number(signs.with_points(tidy(text)))
-    except ValueError:
-        return "must be a number"
-    if is_unit(unit) or scale_of(name, unit) is not None:
+    tidied = tidy(text)
+    number = NUMBER.match(tidied)
+    unit = tidied[number.end() :].strip() if number else ""
+    if unit and (is_unit(unit) or scale_of(name, unit) is not None):
         return f"must be a number alone: write its unit into the header, as in {name} [{unit}]"
     return "must be a number"
 

@@ -337,17 +337,3 @@ class Signs:
                 raise ValueError(
                     f"has a {name}, which is neither the decimal separator nor between thousands"
                 )
-
-    def with_points(self, text: str) -> str:
-        """Return a text whose numbers have decimal points and no other separators.  Raise
-        ValueError for a separator that is neither decimal nor between thousands."""
-        if not self.decimal:
-            return text
-        return "..".join(_NUMERAL.sub(self._with_point, part) for part in text.split(".."))
-
-    def _with_point(self, match: re.Match[str]) -> str:
-        other = "," if self.decimal == "." else "."
-        whole, sign, rest = match[0].partition(self.decimal)
-        if other in rest or (other in whole and not _GROUPED.fullmatch(whole)):
-            raise ValueError(f"must be a number such as 0{self.decimal}5")
-        return whole.replace(other, "") + "." * bool(sign) + rest
