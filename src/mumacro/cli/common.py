@@ -96,6 +96,65 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message} ({self.prog} --help)\n")
 
 
+def number_of(name: str, advice: str = "") -> Callable[[str], float]:
+    """Return a function that reads an option with a number, as 0.15, 0,15 or 15%. For another text
+    argparse reports the fault with the ``advice``."""
+
+    def number(text: str) -> float:
+        try:
+            return read_one(name, text)
+        except InputError as error:
+            raise argparse.ArgumentTypeError(f"{error}{advice}") from None
+
+    return number
+
+
+#: options that several commands have
+OPTIONS: dict[str, dict[str, Any]] = {
+    "contact": {"choices": CONTACTS, "default": "spring", "help": "default: spring"},
+    "direction": {
+        "choices": DIRECTIONS,
+        "default": "across",
+        "metavar": "NAME",
+        "help": f"{', '.join(DIRECTIONS)} (of the normal force); default: across",
+    },
+    "table": {
+        "metavar": "PATH|TOLERANCE",
+        "help": "a file, or the largest error; default: the tightest bundled one",
+    },
+    "json": {"action": "store_true", "help": "print JSON, with all digits, in SI"},
+    "include": {
+        "action": "append",
+        "default": [],
+        "metavar": "NAMES",
+        "help": ", ".join(OUTPUTS),
+    },
+    "stiffness-exponent": {
+        "type": number_of("stiffness_exponent"),
+        "metavar": "M",
+        "help": "k grows as Fz^M from its value at the case's Fz; of a ball: 1/3",
+    },
+}
+
+
+def add_options(parser: argparse.ArgumentParser, *names: str) -> None:
+    """Add options of :data:`OPTIONS`."""
+    for name in names:
+        parser.add_argument(f"--{name}", **OPTIONS[name])
+
+
+def add_out(parser: argparse.ArgumentParser, *names: str) -> None:
+    """Add the option for a file with the result, with more ``names`` than ``-o`` and ``--out``."""
+    text = "write the result there: a picture, .png, .svg or .pdf, or .csv"
+    parser.add_argument("-o", "--out", *names, type=Path, metavar="OUT", help=text)
+
+
+def add_case(parser: OneLineParser, words: str, least: str = "+") -> None:
+    """Add the inputs, explained by ``words``, and the options of all commands that answer."""
+    parser.add_argument("words", nargs=least, metavar="name=value", help=words)
+    add_options(parser, "contact", "direction", "table", "json")
+
+
 def question(
     name: str,
     description: str,
@@ -115,62 +174,9 @@ def question(
     return parser
 
 
-def add_case(parser: OneLineParser, words: str, least: str = "+") -> None:
-    """Add the inputs, explained by ``words``, the options for contact and direction, and the
-    options of all commands that answer."""
-    parser.add_argument("words", nargs=least, metavar="name=value", help=words)
-    add_kind(parser)
-    add_table(parser)
-
-
-def add_contact(parser: argparse.ArgumentParser) -> None:
-    """Add the option for the contact."""
-    parser.add_argument("--contact", choices=CONTACTS, default="spring", help="default: spring")
-
-
-def add_out(parser: argparse.ArgumentParser, *names: str) -> None:
-    """Add the option for a file with the result, with more ``names`` than ``-o`` and ``--out``."""
-    text = "write the result there: a picture, .png, .svg or .pdf, or .csv"
-    parser.add_argument("-o", "--out", *names, type=Path, metavar="OUT", help=text)
-
-
-def add_kind(parser: argparse.ArgumentParser) -> None:
-    """Add the options for the contact and the direction of its oscillation."""
-    add_contact(parser)
-    text = f"{', '.join(DIRECTIONS)} (of the normal force); default: across"
-    parser.add_argument(
-        "--direction", choices=DIRECTIONS, default="across", metavar="NAME", help=text
-    )
-
-
-def add_include(parser: argparse.ArgumentParser) -> None:
-    """Add the option for more outputs than mu_macro."""
-    text = ", ".join(OUTPUTS)
-    parser.add_argument("--include", action="append", default=[], metavar="NAMES", help=text)
-
-
 def included(options: argparse.Namespace) -> tuple[str, ...]:
     """Return the outputs that ``--include`` names.  Raise InputError for an unknown one."""
     return tuple(name for text in options.include for name in names_in(text))
-
-
-def add_table(parser: OneLineParser) -> None:
-    """Add the options of all commands that read a table and answer."""
-    text = "a file, or the largest error; default: the tightest bundled one"
-    parser.add_argument("--table", metavar="PATH|TOLERANCE", help=text)
-    add_form(parser)
-
-
-def add_exponent(parser: OneLineParser) -> None:
-    """Add the option for a stiffness that grows with the load."""
-    text = "k grows as Fz^M from its value at the case's Fz; of a ball: 1/3"
-    number = number_of("stiffness_exponent")
-    parser.add_argument("--stiffness-exponent", type=number, metavar="M", help=text)
-
-
-def add_form(parser: argparse.ArgumentParser) -> None:
-    """Add the option for the form of a result."""
-    parser.add_argument("--json", action="store_true", help="print JSON, with all digits, in SI")
 
 
 def run(title: str, command: Callable[[Any], int | str], arguments: Any) -> int:
@@ -414,19 +420,6 @@ def case_line(typed: TypedCase, kind: Kind, *oscillations: str) -> str:
         numbers = (" ± " if deviation else " to ").join(shown)
         parts.append(f"{field} = {numbers} {unit.symbol}".removesuffix(" -"))
     return "; ".join([", ".join([*parts, *oscillations]), ", ".join(kind.names.values())])
-
-
-def number_of(name: str, advice: str = "") -> Callable[[str], float]:
-    """Return a function that reads an option with a number, as 0.15, 0,15 or 15%. For another text
-    argparse reports the fault with the ``advice``."""
-
-    def number(text: str) -> float:
-        try:
-            return read_one(name, text)
-        except InputError as error:
-            raise argparse.ArgumentTypeError(f"{error}{advice}") from None
-
-    return number
 
 
 def read_values(pairs: Iterable[tuple[str, str]], reader: Callable[[str, str], Any]) -> list[Any]:

@@ -11,8 +11,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from mumacro.cli.common import (
     OneLineParser,
-    add_include,
-    add_kind,
+    add_options,
     included,
     open_table,
 )
@@ -87,15 +86,12 @@ def _parser() -> OneLineParser:
         required=True,
         help="the file to write; its ending sets the format; - is output",
     )
-    add_kind(parser)
-    parser.add_argument(
-        "--table", metavar="PATH|TOLERANCE", help="default: the tightest bundled table"
-    )
+    add_options(parser, "contact", "direction", "table")
     add_format(parser)
     parser.add_argument(
         "--rigid", action="store_true", help="there is no column k: all contacts are rigid"
     )
-    add_include(parser)
+    add_options(parser, "include")
     parser.add_argument("--force", action="store_true", help="replace an output that exists")
     return parser
 

@@ -50,9 +50,9 @@ def _parser() -> OneLineParser:
     parser.add_argument("--load", metavar="COLUMN", help="of the normal force, in place of Fz=")
     text = "the first and the last cycle; default: all samples"
     parser.add_argument("--cycles", type=_cycles, metavar="A..B", help=text)
-    common.add_contact(parser)
+    common.add_options(parser, "contact")
     common.add_out(parser, "--plot")
-    parser.add_argument("--json", action="store_true", help="print JSON, with all digits")
+    common.add_options(parser, "json")
     add_format(parser)
     return parser
 

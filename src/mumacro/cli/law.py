@@ -43,7 +43,7 @@ def _parser() -> OneLineParser:
     )
     parser.add_argument("--points", type=int, help="number of values; default: 25, in pictures 400")
     parser.add_argument("--scale", choices=("log", "linear"), default="log", help="default: log")
-    common.add_exponent(parser)
+    common.add_options(parser, "stiffness-exponent")
     return parser
 
 

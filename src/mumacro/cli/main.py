@@ -82,19 +82,16 @@ Command = Callable[[Sequence[str]], int | str]
 
 def _in_module(name: str) -> Command:
     """Return a command whose module is loaded when it is called, so that one case starts sooner."""
-    return lambda words: importlib.import_module(f"mumacro.cli.{name}").run(words)
+    module = f"mumacro.cli.{name.replace('-', '_')}"
+    return lambda words: importlib.import_module(module).run(words)
 
 
 COMMANDS: dict[str, Command] = {
     "eval": _eval,
-    "law": _in_module("law"),
-    "solve-for": _in_module("solve_for"),
-    "map": _in_module("map"),
-    "motion": _in_module("motion"),
-    "fit": _in_module("fit"),
-    "fit-loop": _in_module("fit_loop"),
-    "stiffness": _in_module("stiffness"),
-    "table": _in_module("table"),
+    **{
+        name: _in_module(name)
+        for name in ("law", "solve-for", "map", "motion", "fit", "fit-loop", "stiffness", "table")
+    },
     "export": _export,
     "serve": _serve,
 }

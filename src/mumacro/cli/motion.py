@@ -66,11 +66,11 @@ def _parser() -> OneLineParser:
     )
     parser.add_argument("words", nargs="+", metavar="name=value", help="a case without y0")
     add_parts(parser)
-    common.add_contact(parser)
+    common.add_options(parser, "contact")
     text = "of the mean force over mu0 Fz, 1e-9 to 1e-2; default: 1e-6"
     parser.add_argument("--tolerance", type=common.number_of("tolerance"), default=1e-6, help=text)
     common.add_out(parser)
-    common.add_form(parser)
+    common.add_options(parser, "json")
     return parser
 
 

@@ -18,7 +18,7 @@ def run(words: Sequence[str], description: str) -> str:
     command."""
     parser = OneLineParser(prog="mumacro", description=description + common.ABOUT_INPUTS)
     common.add_case(parser, "the six inputs, quoted together or apart")
-    common.add_include(parser)
+    common.add_options(parser, "include")
     parser.add_argument(
         "--model", action="store_true", help="in JSON, too: what the model leaves out in this case"
     )
@@ -26,8 +26,9 @@ def run(words: Sequence[str], description: str) -> str:
     options = parser.parse_intermixed_args(words)
     kind = kind_of(options.contact, options.direction)
     case = read_case(options.words, kind, deviations=True)
-    surrogate, asked = open_table(options.table), common.included(options)
-    answer: Any = surrogate.evaluate(case.inputs, **kind.names, include=asked)
+    surrogate, include = open_table(options.table), common.included(options)
+    inputs: dict[str, Any] = {**case.inputs, **kind.names, "include": include}
+    answer: Any = surrogate.evaluate(**inputs)
     if options.json:
         model = {"model": rows_of(answer)} if options.model else {}
         return as_json({**answer.to_dict(), **model}, surrogate)

@@ -69,7 +69,7 @@ def _parser() -> OneLineParser:
     parser.add_argument("--ratio", action="store_true", help="the target is mu_macro / mu0")
     text = "range to search, in the SI unit of the unknown or with a unit"
     parser.add_argument("--between", nargs=2, metavar=("LOW", "HIGH"), help=text)
-    common.add_exponent(parser)
+    common.add_options(parser, "stiffness-exponent")
     motion.add_parts(parser)
     return parser
 

@@ -75,7 +75,7 @@ def run(words: Sequence[str]) -> str:
         for number, which in (("", "first"), ("2", "second")):
             text = f"of the {which} body, in place of E{number} and nu{number}: {_NAMES}"
             part.add_argument(f"--material{number}", metavar="NAME", help=text)
-        common.add_form(part)
+        common.add_options(part, "json")
     options = parser.parse_args(words)
     names = GEOMETRIES[options.geometry].names
     arguments = {name: text for name in names if (text := getattr(options, name)) is not None}

@@ -16,7 +16,7 @@ def run(words: Sequence[str]) -> str:
         description="Name, path, tolerance, verified errors and checksum of the table in use.",
         epilog="example:\n  mumacro table --table 1e-7",
     )
-    common.add_table(parser)
+    common.add_options(parser, "table", "json")
     options = parser.parse_args(words)
     surrogate = open_table(options.table)
     members = {
