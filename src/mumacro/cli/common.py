@@ -52,9 +52,6 @@ inputs, each as name=value, in SI units or with a unit as in y0=2um:
 """
 
 
-CURVE = 400  # points of a curve in a picture
-
-
 class UsageError(Exception):
     """Report a command that is written wrongly, in one line with the remedy."""
 

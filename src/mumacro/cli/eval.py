@@ -47,24 +47,16 @@ def _standard_input(folder: Path) -> Path:
     return path.rename(f"{path}{kind}{packing}")
 
 
-class _Bar(Progress):
-    """Show the fraction of the rows that are evaluated, on a terminal."""
-
-    def __init__(self, console: Console) -> None:
-        super().__init__(
-            BarColumn(),
-            TaskProgressColumn(),
-            TextColumn("{task.description}"),
-            TimeRemainingColumn(),
-            console=console,
-            disable=not console.is_terminal,
-        )
-        self._rows = self.add_task("", total=1.0)
-
-    def show(self, share: float, rows: int, rejected: int) -> None:
-        """Show how many rows are read, and how many of them are rejected."""
-        description = f"{rows:,} rows, {rejected:,} rejected"
-        self.update(self._rows, completed=share, description=description)
+def _bar(console: Console) -> Progress:
+    """Return a bar for the fraction of the rows that are evaluated, on a terminal."""
+    return Progress(
+        BarColumn(),
+        TaskProgressColumn(),
+        TextColumn("{task.description}"),
+        TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+    )
 
 
 def _parser() -> OneLineParser:
@@ -75,22 +67,14 @@ def _parser() -> OneLineParser:
         "The output appears whole or not.",
         epilog=_COLUMNS,
     )
-    parser.add_argument(
-        "cases",
-        nargs="+",
-        help="files, folders or patterns, all of one format; - is standard input",
-    )
-    parser.add_argument(
-        "-o",
-        "--out",
-        required=True,
-        help="the file to write; its ending sets the format; - is output",
-    )
+    text = "files, folders or patterns, all of one format; - is standard input"
+    parser.add_argument("cases", nargs="+", help=text)
+    text = "the file to write; its ending sets the format; - is output"
+    parser.add_argument("-o", "--out", required=True, help=text)
     add_options(parser, "contact", "direction", "table")
     add_format(parser)
-    parser.add_argument(
-        "--rigid", action="store_true", help="there is no column k: all contacts are rigid"
-    )
+    text = "there is no column k: all contacts are rigid"
+    parser.add_argument("--rigid", action="store_true", help=text)
     add_options(parser, "include")
     parser.add_argument("--force", action="store_true", help="replace an output that exists")
     return parser
@@ -110,7 +94,8 @@ def main(words: Sequence[str]) -> int:
             out = options.out
             if out == "-":
                 out = f"{folder}/standard-output.csv"
-            with _Bar(console) as bar:
+            with _bar(console) as bar:
+                rows_read = bar.add_task("", total=1.0)
                 outcome = evaluate_files(
                     files,
                     out,
@@ -121,7 +106,11 @@ def main(words: Sequence[str]) -> int:
                     force=options.force,
                     dialect=dialect_in(options),
                     include=included(options),
-                    progress=bar.show,
+                    progress=lambda share, rows, rejected: bar.update(
+                        rows_read,
+                        completed=share,
+                        description=f"{rows:,} rows, {rejected:,} rejected",
+                    ),
                     say=lambda text: console.print(f"mumacro eval: {text}"),
                 )
             counts = f"{outcome.answered:,} of {outcome.rows:,} rows evaluated with {surrogate.id}"

@@ -6,7 +6,6 @@ from typing import Any
 
 from mumacro.cli import common
 from mumacro.cli.common import (
-    CURVE,
     OneLineParser,
     UsageError,
     in_columns,
@@ -24,6 +23,7 @@ from mumacro.inputs.units import (
     tidy_zeros,
     unit_of,
 )
+from mumacro.questions.law import DRAWN
 from mumacro.questions.law import law as friction_law
 
 EXAMPLE = 'mumacro law "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz" --along v0 0.1mm/s 1m/s'
@@ -41,7 +41,9 @@ def _parser() -> OneLineParser:
     parser.add_argument(
         "--along", nargs=3, metavar=("NAME", "LOW", "HIGH"), required=True, help=text
     )
-    parser.add_argument("--points", type=int, help="number of values; default: 25, in pictures 400")
+    parser.add_argument(
+        "--points", type=int, help="number of values; default: 25, in pictures 2000"
+    )
     parser.add_argument("--scale", choices=("log", "linear"), default="log", help="default: log")
     common.add_options(parser, "stiffness-exponent")
     return parser
@@ -62,9 +64,8 @@ def run(words: Sequence[str]) -> str:
         along,
         start=start,
         stop=stop,
-        points=(CURVE if is_picture else 25) if options.points is None else options.points,
+        points=(DRAWN if is_picture else 25) if options.points is None else options.points,
         scale=options.scale,
-        refine=is_picture,
         stiffness_exponent=options.stiffness_exponent,
         **kind.names,
         **case.inputs,

@@ -135,10 +135,9 @@ class Fit(Result):
         (n,).  Return None if other inputs vary, too, or if v0 is 0 everywhere."""
         inputs = dict(self._problem.columns)
         v0 = inputs.pop("v0")
-        moving = v0[v0 > 0.0]
-        if any(np.unique(x).size > 1 for x in inputs.values()) or not moving.size:
+        if any(np.unique(x).size > 1 for x in inputs.values()) or not v0.any():
             return None
-        fine = np.unique(np.concatenate([np.geomspace(moving.min(), moving.max(), _CURVE), v0]))
+        fine = _fine(v0)
         mu, std = self.predict(v0=fine)
         half_width = self._width() * std
         return {

@@ -1,7 +1,7 @@
 """Convert samples of an oscillation, such as those of a sensor, to the harmonics of a motion."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -115,7 +115,7 @@ def harmonics(samples: Numbers, periods: int = 1, most: int = 20) -> Harmonics:
         shorter = _spectrum(scaled[:-1], scale, periods, most)
         if not result.rms < _CLEARLY * shorter.rms:
             result, notes = shorter, [Note(NOTE, _REPEATED)]
-    return Harmonics(result.terms, result.mean, result.rms, tuple(notes))
+    return replace(result, notes=tuple(notes))
 
 
 def _samples(samples: Any) -> Array:

@@ -14,8 +14,6 @@ from mumacro.kernel.arrays import Array
 from mumacro.surrogate import Surrogate
 
 EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # inputs that are searched over all legal values
-# for a refined curve: the error of a straight line relative to the height, the number of halvings
-_CHORD, _HALVINGS = 1e-3, 8
 
 
 class InputCurve:
@@ -53,24 +51,6 @@ class InputCurve:
         """Return mu_macro [-] at ``x`` and its error bound, in the shape of ``x``."""
         answer = self.answer(x)
         return np.asarray(answer.mu_macro), np.asarray(answer.error_bound)
-
-    def refined(self, values: Array) -> Array:
-        """Return ``values``, and more values where straight lines between them would be far from
-        mu_macro."""
-        mu = self.evaluate(values)[0]
-        for _ in range(_HALVINGS):
-            low, high = values[:-1], values[1:]
-            middle = np.where(low > 0.0, np.sqrt(low) * np.sqrt(high), 0.5 * high)
-            middle_mu = self.evaluate(middle)[0]
-            bent = np.abs(middle_mu - 0.5 * (mu[:-1] + mu[1:])) > _CHORD * np.ptp(mu)
-            indices = np.flatnonzero(bent & (middle > low) & (middle < high))
-            if not indices.size:
-                break
-            values, mu = (
-                np.insert(values, indices + 1, middle[indices]),
-                np.insert(mu, indices + 1, middle_mu[indices]),
-            )
-        return values
 
     def where(self, group: float) -> float:
         """Return the value of k, Fz or mu0 at which y~ (for normal: v~/z) is ``group``, within

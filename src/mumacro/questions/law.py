@@ -37,6 +37,7 @@ from mumacro.surrogate import Surrogate
 from mumacro.validity import digits, effect_of, load_notes
 
 SCALES = ("log", "linear")
+DRAWN = 2000  # points of a law in a picture, where it may be steep
 
 
 @dataclass(frozen=True, repr=False)
@@ -216,7 +217,6 @@ def law(
     points: int = 201,
     scale: str = "log",
     values: Any = None,
-    refine: bool = False,
     contact: str = "spring",
     direction: str = "across",
     stiffness_exponent: float | None = None,
@@ -236,9 +236,6 @@ def law(
         The number of values, evenly spaced on a scale "log" or "linear".
     values : array_like
         The values themselves [SI], ascending, shape (n,), instead of ``start`` and ``stop``.
-    refine : bool
-        Whether to add values where mu_macro bends, for pictures: at the borders, and where a
-        straight line between neighbours would be wrong by more than 0.1 % of the law's height.
     contact, direction : str
         As in :meth:`mumacro.Surrogate.evaluate`.
     stiffness_exponent : float, optional
@@ -284,9 +281,6 @@ def law(
     inputs = fixed_inputs(middle_case, along, kind)
     curve = InputCurve(surrogate, inputs, name, kind, stiffening)
     border = border_crossings(curve, float(x[0]), float(x[-1]))
-    if refine:
-        x = curve.refined(np.union1d(x, [crossing.value for crossing in border]))
-        axis = x / per
     whole = curve
     if ends:
         interval = {**{name: value for name, value in inputs.items() if name != "k"}, **ends}

@@ -46,7 +46,7 @@ from mumacro.inputs.fields import AMPLITUDE, POSITIVE, QUANTITY_OF, Numbers, fie
 from mumacro.inputs.stiffening import stiffening_of
 from mumacro.kernel.arrays import Array
 from mumacro.questions.input_curve import EVERYWHERE, InputCurve
-from mumacro.questions.law import law
+from mumacro.questions.law import DRAWN, law
 from mumacro.questions.search import TINY, Search, samples
 from mumacro.questions.solutions import Reach, Solution
 from mumacro.results import Note
@@ -54,7 +54,6 @@ from mumacro.surrogate import Surrogate
 from mumacro.validity import digits, effect_of, load_notes
 
 HUGE = 1.7976931348623157e308
-_DRAWN = 400  # points of a curve in a picture
 
 # A ray of constant r = y0 omega / v0 is searched for turning points with this many samples a
 # decade.  At r = 10, three per cent above the smallest r with a fold, the fold is a sixth of a
@@ -132,9 +131,8 @@ class TableSolution(Solution):
             self.unknown,
             start=low,
             stop=high,
-            points=_DRAWN,
+            points=DRAWN,
             scale="log" if low > 0.0 else "linear",
-            refine=True,
             **self.question,
         )
         return over.plot(ax, roots_of=roots_of)

@@ -160,24 +160,6 @@ def test_the_band_holds_every_stiffness_of_its_interval(
     assert middle.answer.mu_macro == close(law.answer.mu_macro, rel=1e-14)
 
 
-@every_pair
-@pytest.mark.parametrize("scale", ["log", "linear"])
-def test_a_refined_law_is_straight_between_its_values(
-    surrogate: Surrogate, pair: Any, scale: Any
-) -> None:
-    values = sweep_values("v0", 1e-4, 2.0, 25, scale)
-    law, words, case = law_of(surrogate, pair, values=values, refine=True)
-    assert {*values, *(mark.value for mark in law.border)} <= set(law.values)
-    assert (np.diff(law.values) > 0.0).all()
-    mu = law.answer.mu_macro
-    middle = surrogate.evaluate(
-        **case, **words, v0=np.sqrt(law.values[1:] * law.values[:-1])
-    ).mu_macro
-    assert np.abs(middle - 0.5 * (mu[1:] + mu[:-1])).max() <= 1.1e-3 * np.ptp(mu)
-    assert law.values.size < 150
-    assert (law_of(surrogate, pair, values=values)[0].values == values).all()
-
-
 @pytest.mark.parametrize("pair", PAIRS[1:], ids=" ".join)
 def test_the_articles_formulas_are_refused_for_another_contact(
     surrogate: Surrogate, pair: Any
@@ -249,7 +231,7 @@ def test_the_deviation_of_k_grows_with_k(surrogate: Surrogate) -> None:
 @every_pair
 def test_the_picture_shows_band_and_borders(surrogate: Surrogate, pair: Any) -> None:
     pytest.importorskip("matplotlib").use("Agg")
-    law, _, _ = law_of(surrogate, pair, INTERVAL, refine=True)
+    law, _, _ = law_of(surrogate, pair, INTERVAL)
     axes = law.plot()
     k_title = plotting.case_title({"k": law.k_ends})
     assert (" to " in k_title, k_title in title_of(axes)) == (True, True)
