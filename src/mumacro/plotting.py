@@ -329,12 +329,9 @@ def plot_fit(along: str, curves: Sequence[MeasuredCurve], title: str, ax: Any = 
     x = np.concatenate([one.x for one in curves])
     low = x[x > 0.0].min(initial=math.inf)
     if low < x.max() / 10.0:
-        if (x == 0.0).any():
-            upper.set_xscale("symlog", linthresh=low)
-        else:
-            upper.set_xscale("log")
-        if lower is not None:
-            lower.set_xscale(upper.get_xscale(), **({"linthresh": low} if 0.0 in x else {}))
+        scale = {"value": "symlog", "linthresh": low} if 0.0 in x else {"value": "log"}
+        for ax in filter(None, (upper, lower)):
+            ax.set_xscale(**scale)
     upper.set(ylabel=r"$\mu_\mathrm{macro}$ [-]")
     upper.set_ylim(bottom=min(0.0, upper.get_ylim()[0]))
     (upper if lower is None else lower).set_xlabel(_axis(along))
@@ -463,14 +460,13 @@ def plot_map(
     v_crit: Array,
     ax: Any = None,
     *,
-    point: tuple[float, float] | None = None,
     marks: Marks | None = None,
     direction: str = "across",
     areas: Sequence[str] = (),
     title: str = "",
 ) -> Any:
     """Draw mu~ (m, n) over :func:`speeds` and :func:`amplitudes`, with the border of continuous
-    sliding ``v_crit`` (m,), and cases: a ``point`` (v~, y~), or ``marks``.
+    sliding ``v_crit`` (m,), and with cases as ``marks``.
 
     ``direction`` is the direction of the oscillation; ``areas`` are the regimes at :data:`AREAS`.
     """
@@ -497,8 +493,6 @@ def plot_map(
     bar.ax.tick_params(labelsize="small")
     if marks is not None:
         _mark(ax, marks, normal, halo)
-    elif point is not None and all(math.isfinite(x) and x > 0.0 for x in point):
-        ax.plot(*point, "o", color=INK, ms=10.0, mec="white", mew=2.0, zorder=5)
     head(ax, title)
     # labels are turned along the lines as they are at this moment
     ax.figure.draw_without_rendering()

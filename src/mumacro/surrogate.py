@@ -155,18 +155,10 @@ class Surrogate:
             f"{self.max_abs_error:.1e}>"
         )
 
-    def plot(
-        self,
-        ax: Any = None,
-        *,
-        point: tuple[float, float] | None = None,
-        contact: str = "spring",
-        direction: str = "across",
-    ) -> Any:
-        """Draw the map of mu~ with a ``point`` (v~, y~).  ``ax`` are matplotlib axes, or None for
-        new ones.  They are returned; see ``mumacro.plotting.plot_map``."""
-        kind = kind_of(contact, direction)
-        return self.draw_map(ax, kind, f"{contact}, {direction}", point=point)
+    def plot(self, ax: Any = None, *, contact: str = "spring", direction: str = "across") -> Any:
+        """Draw the map of mu~.  ``ax`` are matplotlib axes, or None for new ones.  They are
+        returned; see ``mumacro.plotting.plot_map``."""
+        return self.draw_map(ax, kind_of(contact, direction), f"{contact}, {direction}")
 
     def draw_map(self, ax: Any, kind: Kind, title: str, **cases: Any) -> Any:
         """Draw the map of a contact and direction with cases, as ``mumacro.plotting.plot_map``

@@ -241,13 +241,6 @@ def test_a_million_cases_are_drawn_as_dots(surrogate: Surrogate) -> None:
 # --- the map, a law, a motion, a fit --------------------------------------------------------------
 
 
-def test_the_map_marks_a_point(surrogate: Surrogate) -> None:
-    axes = surrogate.plot(point=(0.1, 0.5))
-    v, y = axes.lines[0].get_data()
-    np.testing.assert_array_equal(v, surrogate.v_tilde_crit(y))
-    assert data(axes.lines[1]) == [(0.1, 0.5)]
-
-
 def test_a_law_draws_its_numbers_and_borders(surrogate: Surrogate) -> None:
     law = a_law(surrogate)
     axes = law.plot()

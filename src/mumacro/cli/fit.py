@@ -88,21 +88,13 @@ def _text(result: Fit) -> str:
         off, (low, high) = result.std[name], result.interval[name]
         form = f".{digits(off / value if 0.0 < value < math.inf else 0.0)}g"
         number = "rigid" if math.isinf(value) else f"{value:{form}}"
-        rows.append(
-            (
-                name,
-                number,
-                f"[{unit_of(name)}]",
-                f"+- {off:.2g}",
-                f"95 %: {low:{form}} to {high:{form}}",
-            )
-        )
+        ends = f"95 %: {low:{form}} to {high:{form}}"
+        rows.append((name, number, f"[{unit_of(name)}]", f"+- {off:.2g}", ends))
     if STD in result.points:
         rows.append(("chi2", f"{result.reduced_chi2:.3g}", "[-]", "over the degrees of freedom"))
     else:
-        rows.append(
-            ("scatter", f"{math.sqrt(result.reduced_chi2):.2g}", "[-]", "of mu_macro about the fit")
-        )
+        scatter = f"{math.sqrt(result.reduced_chi2):.2g}"
+        rows.append(("scatter", scatter, "[-]", "of mu_macro about the fit"))
     rows.append(("points", str(result.residuals.size), "", f"{result.contact}, {result.direction}"))
     for i, one in enumerate(result.solutions[1:], 2):
         values = ", ".join(f"{name} = {one[name]:.4g} {unit_of(name)}" for name in result.values)

@@ -24,8 +24,7 @@ from mumacro.questions.solve_for import TableRoot, TableSolution, solve_for
 
 EXAMPLE = 'mumacro solve-for y0 "mu0=0.3 Fz=10N k=1N/um f=20kHz v0=10mm/s" --target 0.15'
 _TARGET = ": give mu_macro, such as 0.15 or 15%, or with --ratio mu_macro/mu0"
-
-
+_HEADS = ("between", "and", "mu_macro [-]", "regime")  # behind the unknown
 #: possible unknowns, of a case or of a motion
 UNKNOWN = (*dict.fromkeys((*NAMES, AMPLITUDE, *UNKNOWNS)),)
 
@@ -119,18 +118,13 @@ def run(words: Sequence[str]) -> str:
     table = _table(unknown, rows, unit, k_unit, solution.digits)
     notes = common.note_lines(solution.notes)
     text = "\n".join([common.case_line(case, kind), table, *ranges, *without, *notes])
-    heads = _heads(f"{unknown} [{solution.unit}]", "k [N/m]" if solution.ends else None)
-    in_si = [(*((k,) if solution.ends else ()), *root) for k, root in rows]
-    columns = dict(zip(heads, zip(*in_si, strict=True), strict=True))
+    heads = ("k [N/m]", f"{unknown} [{solution.unit}]", *_HEADS)
+    columns = dict(zip(heads, zip(*((k, *root) for k, root in rows), strict=True), strict=True))
+    if not solution.ends:
+        del columns["k [N/m]"]
     return common.present(
         options, solution, columns, text if options.out is None else "", surrogate
     )
-
-
-def _heads(unknown: str, k: str | None) -> list[str]:
-    """Return the headers of the columns of roots from the header of the unknown and, for an
-    interval, of k."""
-    return [*([k] if k else []), unknown, "between", "and", "mu_macro [-]", "regime"]
 
 
 def _table(
@@ -141,7 +135,7 @@ def _table(
     count: int,
 ) -> str:
     """Return the roots as text, with their k if it is an interval."""
-    table = [_heads(f"{unknown} [{unit.symbol}]", k_unit and f"k [{k_unit.symbol}]")]
+    table = [[*([f"k [{k_unit.symbol}]"] if k_unit else []), f"{unknown} [{unit.symbol}]", *_HEADS]]
     for k, root in rows:
         of_k = [tidy_zeros(format_number(k, k_unit, 6))] if k_unit else []
         values = [format_number(x, unit, count) for x in (root.value, root.low, root.high)]

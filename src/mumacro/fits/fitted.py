@@ -149,27 +149,12 @@ class Fit(Result):
 
     def _members(self) -> dict[str, Any]:
         """Return the members of the fit; the word rigid stands for an infinite k."""
-        worded = {
-            name: _worded(getattr(self, name))
-            for name in ("values", "interval", "solutions", "points")
-        }
-        remarks = {"remarks": self.remarks} if self.remarks else {}
-        return {
-            "values": worded["values"],
-            "std": self.std,  # here infinite does not mean rigid
-            "covariance": self.covariance,
-            "interval": worded["interval"],
-            "residuals": self.residuals,
-            "chi2": self.chi2,
-            "reduced_chi2": self.reduced_chi2,
-            "solutions": worded["solutions"],
-            "warnings": self.warnings,
-            **remarks,
-            "contact": self.contact,
-            "direction": self.direction,
-            "points": worded["points"],
-            "curve": self.curve(),
-        }
+        names = ["values", "std", "covariance", "interval", "residuals", "chi2", "reduced_chi2"]
+        names += ["solutions", "warnings", *(["remarks"] if self.remarks else [])]
+        members = {name: getattr(self, name) for name in (*names, "contact", "direction", "points")}
+        for name in ("values", "interval", "solutions", "points"):  # an infinite std is not rigid
+            members[name] = _worded(members[name])
+        return {**members, "curve": self.curve()}
 
     @property
     def columns(self) -> dict[str, Array]:

@@ -58,7 +58,8 @@ class LoopFit(Result):
         ``ax`` is a pair of matplotlib axes, or one (then no residuals are drawn), or None for new
         ones.  The upper axes are returned.
         """
-        title = f"{', '.join(self._texts()[:2])}; {self.contact}"
+        k, mu0 = self.values["k"], self.values["mu0"]
+        title = f"k = {k:.4g} N/m, mu0 = {mu0:.4g}; {self.contact}"
         x, force, fitted = (self.loop[name] for name in ("displacement", "force", "fitted"))
         return plotting.plot_loop(x, force, fitted, title, ax)
 
@@ -85,10 +86,6 @@ class LoopFit(Result):
             rows.append(("energy", f"{self.energy:.4g}", "[J]", "of a cycle"))
         rows.append(("scatter", f"{self.scatter:.2g}", "[N]", "of the force about the model"))
         return rows
-
-    def _texts(self) -> list[str]:
-        units = {"k": " N/m", "mu0": ""} | {name: f" {unit}" for name, unit in _UNITS.items()}
-        return [f"{name} = {value:.4g}{units[name]}" for name, value in self.values.items()]
 
     def _heading(self) -> str:
         count = f"{self.residuals.size} samples, {self.cycles} cycles"

@@ -8,7 +8,6 @@ slip to its end, and the cycle is the fixed point of the map of a period.
 
 import math
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -22,7 +21,7 @@ from mumacro.inputs.fields import BOUNDS, RAD_PER_CYCLE, STIFFNESS, Numbers, Osc
 from mumacro.kernel.arrays import Array, Bools, common_shape, flat
 from mumacro.kernel.binding import kernels
 from mumacro.kernel.stopping import current, look
-from mumacro.kernel.threads import default_threads
+from mumacro.kernel.threads import share_out
 from mumacro.motions.oscillation import read_oscillation
 from mumacro.results import WARNING, Note, Result, Rows, cell
 
@@ -33,7 +32,8 @@ FURTHEST, SLOWEST = 1e9, 1e-9
 REMAINING = 0.01  # the fraction of a disturbance that is left after ``periods``
 PARTS = ("x", "y", "normal")
 _SPRINGS = 64  # number of springs of a ball in a picture
-_AT_ONCE = 16, 1  # number of cases that a thread takes at a time: springs, balls
+# about how many times longer a motion of a spring, or of a ball, takes than a point of the table
+_COST = 4096, 16_384
 _KERNEL = kernels[-1]
 _LIFTS_OFF = "an oscillation that leaves a load > 0 at every moment: at 0 the contact lifts off"
 _STILL = "> 0, or x or y an oscillation: the friction of a contact that does not move is not fixed"
@@ -374,7 +374,7 @@ def motion(
     )
     legal = _legal(scenes, one=not shape)
     out = np.full((legal.size, 7), math.nan)
-    out[legal] = _steady(scenes, legal, default_threads() if threads is None else threads)
+    out[legal] = _steady(scenes, legal, threads)
     return _answer(scenes, out, shape)
 
 
@@ -453,29 +453,17 @@ def _lowest_load(scenes: Scenes, legal: Bools) -> Array:
     return low
 
 
-def _steady(scenes: Scenes, legal: Bools, threads: int) -> Array:
+def _steady(scenes: Scenes, legal: Bools, threads: int | None) -> Array:
     """Return the rows of the kernel for the legal cases."""
     cases = np.ascontiguousarray(scenes.dimensionless[legal])
     out = np.empty((cases.shape[0], 7))
-    ball = scenes.contact == "ball"
-    step, stop = _AT_ONCE[ball], current()
+    ball, stop = int(scenes.contact == "ball"), current()
 
-    def work(start: int) -> None:
-        part = slice(start, start + step)
-        stop.look()
-        _KERNEL.motions(
-            int(ball), scenes.orders, cases[part], scenes.tolerance, out[part], stop.flag
-        )
+    def work(part: slice) -> None:
+        _KERNEL.motions(ball, scenes.orders, cases[part], scenes.tolerance, out[part], stop.flag)
         stop.look()  # a result that was interrupted does not count
 
-    starts = range(0, cases.shape[0], step)
-    if threads == 1 or len(starts) < 2:
-        for start in starts:
-            work(start)
-    else:
-        with ThreadPoolExecutor(min(threads, len(starts)), thread_name_prefix="mumacro") as pool:
-            for _ in pool.map(work, starts):
-                pass
+    share_out(cases.shape[0], threads, work, _COST[ball])
     return out
 
 
