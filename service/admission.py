@@ -29,12 +29,11 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from fastapi import Request
 from starlette.requests import ClientDisconnect
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import Receive, Scope
 
 from mumacro.kernel.stopping import Stop, StopError
 
-from .problems import FULL, ProblemKind, RequestError, path_in
-from .security import HEALTH_PATHS
+from .problems import TICKET, ProblemKind, RequestError, path_in
 from .settings import Settings
 
 T = TypeVar("T")
@@ -48,7 +47,6 @@ _RECENTLY_S = 10.0  # for this time a client that has asked counts as another on
 # added to the niceness of a thread with long work, so that short requests are answered first
 _NICENESS = 5
 _LOOK_EVERY_S = 0.01  # between two looks whether all threads have ended
-_TICKET = "mumacro.ticket"  # key in the scope of a request that holds something
 _log = logging.getLogger("mumacro.admission")
 
 
@@ -340,15 +338,15 @@ def client_of(scope: Scope) -> str:
 
 def ticket_in(scope: Scope) -> Ticket | None:
     """Return the ticket of a request, if it holds something."""
-    ticket: Ticket | None = scope.get(_TICKET)
+    ticket: Ticket | None = scope.get(TICKET)
     return ticket
 
 
 def ticket_of(scope: Scope) -> Ticket:
-    """Return the ticket of a request; :class:`Admitted` takes it back."""
+    """Return the ticket of a request; :class:`~service.problems.Failures` takes it back."""
     ticket = ticket_in(scope)
     if ticket is None:
-        ticket = scope[_TICKET] = Ticket(scope)
+        ticket = scope[TICKET] = Ticket(scope)
     return ticket
 
 
@@ -359,22 +357,3 @@ async def compute(request: Request, work: Callable[[], T], cost: float = 0.0) ->
         return await ticket.run(work, cost, request.receive)
     finally:
         ticket.leave()
-
-
-class Admitted:
-    """Give back everything that a request holds when it ends (middleware).  If more connections are
-    open than the settings allow, answer only the probes."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request pass if there is room for it."""
-        if FULL in scope.get("state", ()) and path_in(scope) not in HEALTH_PATHS:
-            raise RequestError(ProblemKind.OVERLOADED, "too many connections are open")
-        try:
-            await self._app(scope, receive, send)
-        finally:
-            if ticket := ticket_in(scope):
-                ticket.hold(0)
-                ticket.leave()

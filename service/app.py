@@ -27,7 +27,7 @@ from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp
 
 from . import __version__
-from .admission import Admission, Admitted, Thread, threads_end
+from .admission import Admission, Thread, threads_end
 from .bodies import Direct, HeadAsGet
 from .guide_pages import GuidePages
 from .metrics import Metrics
@@ -37,7 +37,7 @@ from .models.options import Case, CaseColumns, CaseRequest
 from .observe import LogLines, Observe, Observer
 from .problems import Failures
 from .routers import batch, case, contact, health, motion, page, questions, table
-from .security import HEALTH_PATHS, SCHEMES, ClearHead, Keys
+from .security import HEALTH_PATHS, SCHEMES, Entrance, Keys
 from .settings import Settings, load_settings, unknown_variables
 from .tables import Tables
 
@@ -213,8 +213,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(Direct, routes=app.routes)
     if keys:
         app.add_middleware(Keys, keys=keys, open_paths=open_paths)
-    app.add_middleware(ClearHead)
-    app.add_middleware(Admitted)
+    app.add_middleware(Entrance)
     app.add_middleware(Failures)
     app.add_middleware(HeadAsGet)
     if settings.cors_origins:

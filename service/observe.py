@@ -22,7 +22,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from .metrics import Metrics
-from .problems import ABORT, REFUSED, meaning, path_in
+from .problems import ABORT, REFUSED, STATUS, meaning, path_in
 from .security import HEALTH_PATHS, NOSNIFF
 
 _GONE = 499  # the usual status for a client that disconnected before the answer
@@ -186,8 +186,9 @@ class Observer:
         self._stem = os.urandom(8).hex()
         self._numbers = itertools.count(int.from_bytes(os.urandom(6)))
 
-    def name(self, scope: Scope) -> None:
-        """Give a request its id: the one in its header, or a new one."""
+    def name(self, scope: Scope) -> tuple[tuple[bytes, bytes], ...]:
+        """Give a request its id, the one in its header or a new one, and return the headers of its
+        answer."""
         if "request_id" not in scope:
             proposal = dict(scope["headers"]).get(b"x-request-id", b"")
             scope["request_id"] = (
@@ -195,10 +196,6 @@ class Observer:
                 if _ID.fullmatch(proposal)
                 else f"{self._stem}{next(self._numbers):016x}"
             )
-
-    @staticmethod
-    def marks(scope: Scope) -> tuple[tuple[bytes, bytes], ...]:
-        """Return the headers of every answer."""
         return (b"x-request-id", scope["request_id"].encode()), NOSNIFF
 
     def record(self, scope: Scope, status: int, seconds: float) -> None:
@@ -240,29 +237,27 @@ class Observe:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        start, status, state = time.perf_counter(), _GONE, scope.get("state", {})
-        self._observer.name(scope)
-        marks = self._observer.marks(scope)
+        start, state = time.perf_counter(), scope.setdefault("state", {})
+        marks = self._observer.name(scope)
         if any(name in _OF_PROXIES for name, _ in scope["headers"]):
             await self._proxies(scope, receive, send)
 
         async def send_marked(message: Message) -> None:
-            nonlocal status
             if message["type"] == "http.response.start":
-                status = message["status"]
+                state[STATUS] = message["status"]
                 message["headers"] = [*message["headers"], *marks]
             await send(message)
 
         try:
             await self._app(scope, receive, send_marked)
         except ClientDisconnect as error:
-            status, cause = _GONE, error.__cause__
+            state[STATUS], cause = _GONE, error.__cause__
             if isinstance(cause, Exception):
                 # in the middle of its answer: the connection ends without the rest
-                status = meaning(cause, scope).kind.status
+                state[STATUS] = meaning(cause, scope).kind.status
                 if ABORT not in state:
                     raise  # another server ends it
                 state[ABORT]()
         finally:
             seconds = time.perf_counter() - start
-            self._observer.record(scope, state.get(REFUSED, status), seconds)
+            self._observer.record(scope, state.get(REFUSED, state.get(STATUS, _GONE)), seconds)

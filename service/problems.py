@@ -21,7 +21,7 @@ from pydantic import BaseModel, ValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.inputs.case import no_number
@@ -328,6 +328,9 @@ class RequestError(MumacroError):
 #: what our own server (server.py) writes into ``scope["state"]`` of a request: how to end its
 #: connection, whether too many are open, and the status if the server refused it
 ABORT, FULL, REFUSED = "abort", "full", "refused"
+#: the status of an answer that has begun, in ``scope["state"]``, and what the request holds (a
+#: :class:`~service.admission.Ticket`), in its scope
+STATUS, TICKET = "status", "mumacro.ticket"
 
 
 def path_in(scope: Scope) -> str:
@@ -428,8 +431,8 @@ def problem_of(error: RequestError, scope: Scope) -> Response:
 
 
 class Failures:
-    """Convert every exception to a problem document (middleware); an unexpected one goes to the
-    log."""
+    """Convert every exception to a problem document (middleware), and give back what the request
+    holds.  An unexpected exception goes to the log."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -439,20 +442,15 @@ class Failures:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        has_begun = False
-
-        async def send_noting(message: Message) -> None:
-            nonlocal has_begun
-            has_begun = True
-            await send(message)
-
         try:
-            await self._app(scope, receive, send_noting)
+            await self._app(scope, receive, send)
         except ClientDisconnect:
             raise
         except Exception as error:
             _log_unexpected(error, scope)
-            if has_begun:  # end the connection without the end of the answer
+            if (
+                STATUS in scope["state"]
+            ):  # it has begun: end the connection without the end of the answer
                 raise ClientDisconnect from error
             try:
                 answer = problem_of(meaning(error, scope), scope)
@@ -460,6 +458,10 @@ class Failures:
                 _log_unexpected(fault, scope)
                 answer = problem_of(meaning(fault, scope), scope)
             await answer(scope, receive, send)
+        finally:
+            if ticket := scope.get(TICKET):
+                ticket.hold(0)
+                ticket.leave()
 
 
 def _log_unexpected(error: Exception, scope: Scope) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from .problems import ProblemKind, RequestError, path_in
+from .problems import FULL, ProblemKind, RequestError, path_in
 
 #: the two ways to send a key, as OpenAPI names them
 SCHEMES = {
@@ -61,14 +61,17 @@ class Keys:
         return names[0]
 
 
-class ClearHead:
-    """Refuse headers that contradict each other."""
+class Entrance:
+    """Refuse headers that contradict each other, and all but the probes on a connection beyond the
+    limit (middleware)."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request pass if its headers are unambiguous."""
+        """Let a request pass if there is room for it and its headers are unambiguous."""
+        if FULL in scope.get("state", ()) and path_in(scope) not in HEALTH_PATHS:
+            raise RequestError(ProblemKind.OVERLOADED, "too many connections are open")
         fields = scope.get("headers", ())
         headers = dict(fields)
         if scope.get("http_version") == "1.1" and b"host" not in headers:

@@ -136,7 +136,7 @@ class Connection(HttpToolsProtocol):
             self.abort()
         elif not self.transport.is_closing():
             problem = self._refused(error.kind.status)
-            answer, marks = problem_of(error, problem), self._observer.marks(problem)
+            answer, marks = problem_of(error, problem), self._observer.name(problem)
             fields = b"".join(b"%b: %b\r\n" % field for field in (*answer.raw_headers, *marks))
             start = b"HTTP/1.1 %d %b" % (error.kind.status, error.kind.title.encode())
             self.transport.write(b"%b\r\n%b\r\n%b" % (start, fields, bytes(answer.body)))

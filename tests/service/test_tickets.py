@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
-from service.admission import Admission, Admitted, Ticket
+from service.admission import Admission, Ticket
 from service.bodies import read_body
 from service.problems import FULL, RequestError
-from service.security import HEALTH_PATHS
+from service.security import HEALTH_PATHS, Entrance
 from service.settings import Settings
 from tests.support.serving import CASE
 
@@ -127,10 +127,10 @@ def test_beyond_the_connections_only_the_probes_are_answered(path: str) -> None:
     async def main(admission: Admission) -> None:
         full = {**scope_of(admission), "state": {FULL: True}}
         ends: Any = None
-        await Admitted(app)({**full, "path": path}, ends, ends)
+        await Entrance(app)({**full, "path": path}, ends, ends)
         with pytest.raises(RequestError, match="too many connections"):
-            await Admitted(app)(full, ends, ends)
-        await Admitted(app)({**full, "state": {}}, ends, ends)
+            await Entrance(app)(full, ends, ends)
+        await Entrance(app)({**full, "state": {}}, ends, ends)
 
     run(main)
     assert answered == [path, "/v1/law"]
