@@ -331,8 +331,8 @@ STATES = (
     "#direction=normal&Fz_amplitude=9.99 N",
     "#f=20000 kHz&mu0=30&Fz=5 apples&v0=0",
     "#mu0=-1&from=0&along=Fz",
-    "#panel=motion&x=2 parsec&y=2&normal=3 N @ 45 deg",
-    "#panel=motion&y=2 um&k=1 ± 0.1 N/um",
+    "#motion=any&x=2 parsec&y=2&normal=3 N @ 45 deg",
+    "#motion=any&y=2 um&k=1 ± 0.1 N/um",
     "#panel=fit",
 )
 
@@ -390,11 +390,11 @@ def test_no_text_of_a_plot_lies_on_another(open_page: Any, width: int) -> None:
     kinds = ("", "contact=ball&direction=along", "direction=normal", "k=rigid", "k=0.1..10 N/um")
     for kind in kinds:
         for law in ("", "&along=Fz", "&along=k&scale=linear", "&along=y0&v0=1e3"):
-            page = open_page(f"#{kind}{law}&panel=motion", width=width, height=800)
+            page = open_page(f"#{kind}{law}&motion=any", width=width, height=800)
             assert page.run(COVERED) == [], (kind, law)
 
 
-@pytest.mark.parametrize("address", ["", LONGEST, "#panel=motion", "#contact=ball&k=0.1..10 N/um"])
+@pytest.mark.parametrize("address", ["", LONGEST, "#motion=any", "#contact=ball&k=0.1..10 N/um"])
 def test_every_box_holds_its_text_on_paper(open_page: Any, address: str) -> None:
     page = open_page(address, width=1280, height=800)
     with page.paper():
@@ -420,7 +420,7 @@ def test_links_have_one_look_and_buttons_another(open_page: Any) -> None:
         "const look = (one) => { const seen = getComputedStyle(one); return [seen.color,"
         " seen.backgroundColor, seen.textDecorationLine].join(' '); };"
         "const of = (all) => [...new Set([...document.querySelectorAll(all)].map(look))];"
-        "return [of('a'), of('button:enabled:not([role=tab], #tab-motion), .button')];"
+        "return [of('a'), of('button:enabled:not([role=tab]), .button')];"
     )
     assert [len(one) for one in looks] == [1, 1]
     assert "underline" in looks[0][0]
@@ -485,7 +485,7 @@ def test_the_page_is_accessible(open_page: Any, repository: Path, width: Any) ->
     page.choose("#points", "v0 mu_macro\n0.001 0.1\n0.1 0.2")
     page.click("#fit-button")
     assert inaccessible(page, repository) == {}
-    page.click("#tab-motion")
+    page.click("[name=direction][value=any]")
     page.click("#motion-target-form button")
     assert inaccessible(page, repository) == {}
     page.click("[data-meanings=values]")

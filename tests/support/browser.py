@@ -167,6 +167,13 @@ class Page:
     def find(self, selector: str) -> Any:
         return self.browser.find_element("css selector", selector)
 
+    def rects(self, selector: str) -> Any:
+        """The boxes of all elements."""
+        return self.run(
+            f"return [...document.querySelectorAll({selector!r})]"
+            ".map((one) => one.getBoundingClientRect().toJSON());"
+        )
+
     def text(self, selector: str) -> Any:
         """The text of an element, without what keeps its equations on one line."""
         return plain(self.run(f"return document.querySelector({selector!r}).textContent;"))

@@ -25,13 +25,13 @@ export function cards(store, moved, aim, again) {
   const map = mapPanel(store, moved, again);
   const law = lawPanel(store, moved);
   const side = sidePanel(store, moved, aim);
-  const copy = copies("copy");
+  const copy = copies();
   const open = panels(store);
   const stiffness = stiffnessPanel(store, moved);
   const fit = fitPanel(store, moved, (address) =>
     store.change(fromAddress(`#${address}&panel=fit`).state),
   );
-  const motion = motionPanel(store, moved);
+  const motion = motionPanel(store, moved, copy);
   meaningsDialog();
   for (const [kind, media] of [
     ["beforeprint", "all"],
@@ -43,20 +43,23 @@ export function cards(store, moved, aim, again) {
     });
   lawFields(store);
 
-  const point = (answer, target) => map(answer, target?.mu_ratio);
+  const point = (answer, target) => {
+    if (store.state.motion === "one") map(answer, target?.mu_ratio);
+  };
 
   /** While something is dragged, what asks another question waits for the end of it. */
   function rest(answer, trouble, target, old) {
     const { state } = store;
-    law(state, answer, point(answer, target), target, old);
-    side(answer);
-    const settled = answer?.state === state;
-    copy(textsOf(state), settled ? null : (trouble?.text ?? "there is no number yet."));
+    if (state.motion === "any") motion(answer, answer?.state === state || trouble !== null);
+    else {
+      law(state, answer, target, old);
+      side(answer);
+      copy(textsOf(state), !trouble);
+    }
     if (store.dragged) return;
     open(state.panel);
     stiffness();
     fit(answer);
-    motion(answer, settled || trouble !== null);
     for (const name of LAW_FIELDS) $(name).value = state[name];
     $("digits").checked = state.digits === "all";
     $("axis").checked = state.axis === "zero";
@@ -67,12 +70,9 @@ export function cards(store, moved, aim, again) {
   return { point, rest };
 }
 
-/** What is open beside the map, and any motion below it; the result opens one by its name. */
+/** What is open beside the map; the result opens it by its name. */
 function panels(store) {
-  const parts = { stiffness: "part-stiffness", fit: "part-fit", motion: "part-motion" };
-  $("tab-motion").addEventListener("click", () =>
-    store.look({ panel: store.state.panel === "motion" ? "none" : "motion" }),
-  );
+  const parts = { stiffness: "part-stiffness", fit: "part-fit" };
   for (const button of document.querySelectorAll("[data-close]"))
     button.addEventListener("click", () => {
       const { panel } = store.state;
@@ -82,8 +82,7 @@ function panels(store) {
   let shown; // what a link opens stays where it is, below the number
   return (panel) => {
     for (const [name, id] of Object.entries(parts)) $(id).hidden = name !== panel;
-    $("tool").hidden = !["stiffness", "fit"].includes(panel);
-    $("tab-motion").setAttribute("aria-expanded", String(panel === "motion"));
+    $("tool").hidden = panel === "none";
     const opened = shown !== undefined && panel !== shown && panel !== "none";
     shown = panel;
     if (opened) $(parts[panel]).scrollIntoView({ block: "nearest" });

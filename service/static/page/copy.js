@@ -3,7 +3,6 @@
 import { $, write } from "./dom.js";
 import { html, render } from "../lib/lit-html.js";
 import { PARTS, caseOf, motionOf, toAddress } from "./state.js";
-import { capital, prose } from "./words.js";
 
 /** What is copied, with the word on its button. */
 const BUTTONS = { link: "Link", curl: "curl", python: "Python", command: "Command" };
@@ -62,34 +61,44 @@ export function motionTexts(state, answer) {
 }
 
 /**
- * Makes buttons in the row `id` that copy texts, beside the field that shows them.  The returned
- * function takes them; where there is no number, it takes the reason, and the link alone is left.
+ * Makes buttons that copy texts, above the field that shows the one that was copied last.  The
+ * returned function takes the texts; where they have no number, the link alone is there.
  */
-export function copies(id) {
-  const button = ([name, word]) => html`<button data-copy=${name}>${word}</button>`;
-  render(Object.entries(BUTTONS).map(button), $(`${id}-row`));
-  const [buttons, field] = [[...$(`${id}-row`).children], $(`${id}-text`)];
+export function copies() {
+  const field = $("copy-text");
   let texts = {};
-  let reason = null;
-  const shown = (name) => texts[name] ?? `Not available. ${capital(prose(reason))}`;
-  $(`${id}-row`).addEventListener("click", async ({ target }) => {
+  let usable = false;
+  let chosen = "command";
+  function draw() {
+    const name = usable ? chosen : "link";
+    const button = ([one, word]) =>
+      html`<button
+        data-copy=${one}
+        aria-pressed=${String(one === name)}
+        ?disabled=${!usable && one !== "link"}
+      >
+        ${word}
+      </button>`;
+    render(Object.entries(BUTTONS).map(button), $("copy-row"));
+    field.value = texts[name];
+  }
+  $("copy-row").addEventListener("click", async ({ target }) => {
     const name = target.closest("[data-copy]")?.dataset.copy;
     if (!name) return;
-    field.value = texts[name];
+    if (usable) chosen = name;
+    draw();
     try {
       await navigator.clipboard.writeText(texts[name]);
-      write(`${id}-status`, "Copied.");
+      write("copy-status", "Copied.");
     } catch {
       // without https a browser may refuse: the text is there to be copied by hand
       field.select();
-      write(`${id}-status`, "Select and copy it.");
+      write("copy-status", "Select and copy it.");
     }
   });
-  return (latest, why = null) => {
-    [texts, reason] = [why === null ? latest : { link: latest.link }, why];
-    for (const button of buttons) button.disabled = !Object.hasOwn(texts, button.dataset.copy);
-    field.value = shown("command");
-    field.classList.toggle("hint", why !== null);
-    write(`${id}-status`, "");
+  return (latest, answered) => {
+    [texts, usable] = [latest, answered];
+    draw();
+    write("copy-status", "");
   };
 }

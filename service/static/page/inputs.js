@@ -1,5 +1,5 @@
-// The card of the inputs: contact, direction, sketch, and a field for each input.  Its label is
-// dragged, and what the service understood stands below it where that says more than the text.
+// The card of the inputs: contact, oscillation, sketch, and a field for each input.  Its label is
+// dragged, and has what the service understood where that says more than the text.
 import { dials } from "./dials.js";
 import { $, attribute, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
@@ -19,21 +19,25 @@ import {
 /** Of an input, by one press of an arrow key; with Shift. */
 const [STEP, FINE_STEP] = [1.05, 1.005];
 
+const ANY = "with several oscillations at once";
 /** What can be done with a label. */
 const HOW =
   "Drag it sideways: 1 pixel is 1 %. Arrow up and down in the field: 5 %, with Shift 0.5 %";
 
-/** A choice of a few words, as a row of buttons of which one is pressed in. */
-export function choice(store, name, words, reasons = {}) {
+/**
+ * A choice of a few words, as a row of buttons of which one is pressed in; `take(value)` hears of
+ * another one.
+ */
+function choice(name, words, chosen, take, reasons) {
   const one = (value) => html`
     <label title=${reasons[value] ?? nothing}>
       <input
         type="radio"
         name=${name}
         value=${value}
-        .checked=${store.state[name] === value}
+        .checked=${chosen === value}
         ?disabled=${Object.hasOwn(reasons, value)}
-        @change=${() => store.change({ [name]: value })}
+        @change=${() => take(value)}
       />
       <span>${words[value]}</span>
     </label>
@@ -50,10 +54,13 @@ export function choice(store, name, words, reasons = {}) {
  */
 function understood(name, typed, { text, value, unit, std, low, high } = {}, dragged = false) {
   if (typeof value !== "number" || ((text ?? typed) !== typed && !dragged)) return "";
-  if (low !== undefined && high !== undefined)
-    return `${inUnit(name, low, unit ?? undefined)} to ${inUnit(name, high, unit ?? undefined)}`;
+  if (high !== undefined) {
+    const [from, to] = [low, high].map((end) => inUnit(name, end, unit ?? undefined));
+    const [number] = from.split(" ");
+    return asTyped(`${number}..${to}`) === asTyped(typed) ? "" : `${number} to ${to}`;
+  }
+  if (std) return typed.includes("%") ? `± ${inUnit(name, std, unit ?? undefined, 3)}` : "";
   const said = inUnit(name, value, unitAt(name, value, unit), 6);
-  if (std) return `${said}, standard deviation ${inUnit(name, std, unit ?? undefined, 3)}`;
   return text && !dragged && asTyped(text) !== asTyped(said) ? `read as ${said}` : "";
 }
 
@@ -68,7 +75,8 @@ export function inputsPanel(store, moved) {
     const { label, symbol, note, meaning } = about.inputs[name];
     const rigid = name === "k" && store.state.contact === "rigid";
     const text = rigid ? "rigid" : store.state[name];
-    const below = fault ?? doubt ?? understood(name, text, answer?.inputs[name], store.dragged);
+    const below = name === typing ? "" : prose(fault ?? doubt ?? "");
+    const read = understood(name, text, answer?.inputs[name], store.dragged);
     const movable = numberOf(answer?.inputs[name]) > 0 && !rigid;
     return html`
       <div class="field ${name === typing ? "" : fault ? "bad" : doubt ? "doubt" : ""}">
@@ -79,7 +87,7 @@ export function inputsPanel(store, moved) {
         >
           <span class="symbol">${symbol}</span>
           <span class="label"
-            >${label}<small>${name === typing ? "Enter takes it" : note}</small></span
+            >${label}<small>${name === typing ? "Enter takes it" : read || note}</small></span
           >
         </label>
         <input
@@ -92,7 +100,7 @@ export function inputsPanel(store, moved) {
           ?disabled=${rigid}
           .value=${text}
         />
-        <p id=${`note-${name}`} class="note">${name === typing ? "" : prose(below)}</p>
+        <p id=${`note-${name}`} class="note">${below}</p>
         ${name === "k" && !rigid ? ways(numberOf(answer?.inputs.k)) : nothing}
       </div>
     `;
@@ -124,10 +132,10 @@ export function inputsPanel(store, moved) {
       </button>
     `;
     return html`<p class="ways">
-      <span>from</span> ${tool("stiffness", "materials", "k from materials")}
+      Find k: ${tool("stiffness", "materials", "k from materials")}
       ${tool("fit", "points", "k from measured points of friction")}
-      ${interval}
       <a title="k from a measured loop" href=${pageOf("how-to/loop")}>loop</a>
+      ${interval}
     </p>`;
   }
 
@@ -146,12 +154,16 @@ export function inputsPanel(store, moved) {
     stepped = { name, value, text: store.state[name] };
   }
 
+  /** What is chosen of the oscillation: a direction, or any motion. */
+  const oscillation = () => (store.state.motion === "any" ? "any" : store.state.direction);
+
   /** The set-up as a drawing and in words, with the reasons for what cannot be chosen. */
   function sketch(reasons) {
-    const { contact, direction } = store.state;
+    const { contact } = store.state;
+    const way = oscillation();
     for (const part of $("sketch").querySelectorAll(".body, .motion"))
-      part.toggleAttribute("hidden", !part.matches(`.body.${contact}, .motion.${direction}`));
-    const words = `${about.choices.contact[contact]}, ${about.choices.direction[direction]}`;
+      part.toggleAttribute("hidden", !part.matches(`.body.${contact}, .motion.${way}`));
+    const words = `${about.choices.contact[contact]}, ${about.choices.direction[way] ?? ANY}`;
     attribute("sketch", "aria-label", `The set-up: ${words}`);
     write("chosen", [`${words[0].toUpperCase()}${words.slice(1)}.`, ...reasons].join(" "));
   }
@@ -159,7 +171,9 @@ export function inputsPanel(store, moved) {
   function fields() {
     const doubts = (name) =>
       answer?.remarks?.find(({ row, field: one }) => row === "units" && one === name)?.text;
-    const rows = inputsOf(store.state).map((name) => field(name, known.get(name), doubts(name)));
+    const one = store.state.motion === "one"; // any motion has amplitudes of its own
+    const names = inputsOf(store.state).filter((name) => one || name !== "y0");
+    const rows = names.map((name) => field(name, known.get(name), doubts(name)));
     render(rows, $("fields"));
   }
 
@@ -194,6 +208,8 @@ export function inputsPanel(store, moved) {
   return (reply, faults) => {
     [answer, known] = [reply, faults];
     const { contact, direction } = store.state;
+    const take = (way) =>
+      store.change(way === "any" ? { motion: way } : { motion: "one", direction: way });
     const without = (kind) => about.impossible[kind];
     const reasons = (names, kind) =>
       Object.fromEntries(names.map((name) => [name, without(kind(name))]).filter(([, why]) => why));
@@ -201,8 +217,8 @@ export function inputsPanel(store, moved) {
     const ways = reasons(["across", "along", "normal"], (name) => `${contact} ${name}`);
     render(
       [
-        choice(store, "contact", about.contacts, ball),
-        choice(store, "direction", about.directions, ways),
+        choice("contact", about.contacts, contact, (one) => store.change({ contact: one }), ball),
+        choice("direction", { ...about.directions, any: "any" }, oscillation(), take, ways),
       ],
       $("choices"),
     );

@@ -1,8 +1,8 @@
-// The friction law: µ over one input, with the map's colours behind it.
+// The friction law: µ over one input.
 import { Channel } from "./ask.js";
 import d3 from "./d3.js";
 import { $, attribute, write } from "./dom.js";
-import { headline } from "./number.js";
+import { endsOf, inLine } from "./number.js";
 import { Plot, save } from "./plot.js";
 import { post } from "./service.js";
 import { caseAround, inputsOf } from "./state.js";
@@ -12,7 +12,6 @@ import {
   inPrint,
   inUnit,
   inWords,
-  middleOf,
   numberOf,
   show,
   toSI,
@@ -64,9 +63,15 @@ function lawQuestion(state, answer) {
   };
 }
 
+/** What a state says of the case: where the number is an earlier one, the law is its law. */
+const inputsAlone = (state) =>
+  Object.fromEntries(
+    [...Object.keys(about.inputs), "contact", "direction"].map((name) => [name, state[name]]),
+  );
+
 /** `moved({ name: value [SI] })` takes a value that was pointed at. */
 export function lawPanel(store, moved) {
-  let answer, law, colours, target, latest;
+  let answer, law, target, latest;
   let pointer = null; // where it is in the plot
   let refused = null;
   let behind = false; // whether the number belongs to earlier values
@@ -116,10 +121,11 @@ export function lawPanel(store, moved) {
     if (std) return [-1, 1].map((side) => mu.map((one, i) => Math.max(one + side * std[i], 0)));
     return low ? [low, high] : null;
   }
+  /** What is drawn of the case itself. */
+  const own = () => endsOf(answer) ?? [answer.mu_macro];
   /** The lower end of the axis of µ: 0, or a little below what is drawn where that is far above. */
   function bottom(top) {
-    const low = answer.mu_macro - (answer.std ?? 0);
-    const drawn = [low, ...law.mu_static, ...law.mu_macro, ...(band() ?? []).flat()];
+    const drawn = [...own(), ...law.mu_static, ...law.mu_macro, ...(band() ?? []).flat()];
     const [least, most] = [Math.min(...drawn), Math.max(...drawn)];
     const bottom = least - 0.15 * (top - least);
     const flat = most - least < FLAT * most;
@@ -129,14 +135,19 @@ export function lawPanel(store, moved) {
 
   function paint() {
     if (!law || !answer) return;
-    const high = answer.mu_macro + (answer.std ?? 0); // of the case
-    const top = 1.05 * Math.max(...heights(), high, ...(band()?.[1] ?? law.mu_macro)) || 1;
+    const top = 1.05 * Math.max(...heights(), ...own(), ...(band()?.[1] ?? law.mu_macro)) || 1;
+    const foot = bottom(top);
     const places = shown();
     plot.axes({
       x: { domain: [places[0], places.at(-1)], log: law.scale === "log", title: heading() },
-      y: { domain: [bottom(top), top], log: false, title: "friction µ" },
+      y: {
+        domain: [foot, top],
+        log: false,
+        title: `friction µ${foot > 0 ? `, axis from ${show(foot, 2)}` : ""}`,
+      },
       lines: true,
     });
+    if (foot > 0) plot.cut();
     const { inside, box } = plot;
     plot.path(
       places.map((x, i) => [x, law.mu_static[i]]),
@@ -148,7 +159,6 @@ export function lawPanel(store, moved) {
       places.map((x, i) => [x, law.mu_macro[i]]),
       "curve",
     );
-    strip();
     for (const { value } of law.border) {
       const x = plot.x(toUnit(law.along, value, unit()));
       inside.append("path").attr("class", "border").attr("d", `M${x} ${box.y}v${box.height}`);
@@ -198,22 +208,12 @@ export function lawPanel(store, moved) {
     const here = rigid ? Infinity : numberOf(answer.inputs[law.along]);
     if (here === undefined) return;
     const x = toUnit(law.along, here, unit());
-    if (answer.std) {
-      const low = Math.max(answer.mu_macro - answer.std, 0);
-      plot.bar([x, low], [x, answer.mu_macro + answer.std]);
-    }
+    const { low, high } = answer.inputs[law.along];
+    const ends = endsOf(answer);
+    if (high > low)
+      plot.bar(...[low, high].map((end) => [toUnit(law.along, end, unit()), answer.mu_macro]));
+    else if (ends) plot.bar(...ends.map((end) => [x, end]));
     plot.point(x, answer.mu_macro);
-  }
-
-  /** The colours of the map beside the axis of µ, where one µ₀ holds for the whole law. */
-  function strip() {
-    if (!colours || law.along === "mu0") return;
-    const levels = [0, ...colours.levels, 1].map((level) => plot.y(level * heights()[0]));
-    colours.colours.forEach((colour, i) => {
-      const part = plot.inside.append("rect").attr("class", "strip").style("fill", colour);
-      part.attr("x", plot.box.x).attr("width", 6);
-      part.attr("y", levels[i + 1]).attr("height", levels[i] - levels[i + 1]);
-    });
   }
 
   const range = (places, low, high, className) =>
@@ -228,10 +228,12 @@ export function lawPanel(store, moved) {
           .y1((_, i) => plot.y(high[i]))(places),
       );
 
-  /** µ of the case as the headline has it. */
-  function number(one) {
-    const { value, std } = headline(one, false);
-    return std ? `${value} ± ${std}` : value;
+  /** The value of the case on the axis, or both ends of its interval; empty where it has none. */
+  function here() {
+    const { low, high } = answer?.inputs[law.along] ?? {};
+    if (high > low) return `${text(low)} to ${inUnit(law.along, high, unit())}`;
+    const value = numberOf(answer?.inputs[law.along]);
+    return value === undefined ? "" : text(value);
   }
 
   /** What stands below the law: at the pointer, else at the user's point. */
@@ -239,15 +241,7 @@ export function lawPanel(store, moved) {
     pointer = place;
     if (!law) return;
     if (!place || !plot.box || !plot.holds(place)) {
-      const one = numberOf(answer?.inputs[law.along]);
-      const middle = answer ? middleOf(answer) : "";
-      const where = middle && law.along !== "k" ? ` and ${middle}` : "";
-      const words =
-        one === undefined
-          ? ""
-          : `${middle ? "At" : "Your case:"} ${text(one)}${where}, ` +
-            `µ = ${middle ? friction(answer.mu_macro, 4) : number(answer)}`;
-      write("law-read", whole(words));
+      write("law-read", here() && whole(`Your case: ${here()}, µ = ${inLine(answer)}`));
       return;
     }
     const i = bisectCenter(law.values, toSI(law.along, plot.x.invert(place[0]), unit()));
@@ -306,23 +300,19 @@ export function lawPanel(store, moved) {
   );
 
   let ground; // what the curve is drawn on
-  return (state, reply, scale, wanted, old) => {
+  return (state, reply, wanted, old) => {
     if (reply !== answer || wanted !== target) plot.remark();
-    [answer, colours, target] = [reply, scale, wanted];
+    [answer, target] = [reply, wanted];
     behind = old;
+    const drawn = old ? { ...state, ...inputsAlone(reply.state) } : state;
     tell();
     for (const id of ["csv", "law-image"]) $(id).disabled = !law;
-    if (!answer) {
-      write("law-read", "There is no case to draw yet.");
-      return;
-    }
-    const { value: mu0 } = answer.inputs.mu0;
-    const kind = [colours?.contact, colours?.direction];
-    const below = [unit(), mu0, answer.std, state.axis, ...kind].join();
+    if (!answer) return;
+    const below = [unit(), answer.inputs.mu0.value, own(), state.axis].join();
     if (below !== ground) plot.redraw();
     ground = below;
-    const question = lawQuestion(state, answer);
-    const [low, high] = usualRange(state, answer);
+    const question = lawQuestion(drawn, answer);
+    const [low, high] = usualRange(drawn, answer);
     const usual = unitOver(state.along, low, high, answer.inputs[state.along]?.unit);
     $("from").placeholder = `auto: ${inUnit(state.along, low, usual, 3)}`;
     $("to").placeholder = `auto: ${inUnit(state.along, high, usual, 3)}`;

@@ -27,8 +27,9 @@ function questionOf(state) {
   };
 }
 
+const answerTo = (state) => post("v1/mu-macro", questionOf(state));
 const point = new Channel(
-  (state) => post("v1/mu-macro", questionOf(state)),
+  answerTo,
   (reply, state) => {
     answer = { ...reply, state };
     trouble = null;
@@ -38,9 +39,25 @@ const point = new Channel(
   (reason, calm, reply) => {
     const faults = (reply?.faults ?? []).map(({ field, reason: why }) => [field, why]);
     trouble = reason === null ? null : { text: reason, calm, faults: new Map(faults) };
+    if (reply?.refused && !answer) instead.push({ ...asked, ...startOf(trouble.faults) });
     show();
   },
 );
+
+/** Where a link is refused there is no earlier number: one with what is at fault as at the start,
+ * or else with all inputs so. */
+const instead = new Channel(
+  answerTo,
+  (reply, state) => {
+    answer ??= { ...reply, state };
+    show();
+  },
+  (_reason, _calm, reply) => {
+    if (reply?.refused) instead.push({ ...asked, ...about.start });
+  },
+);
+const startOf = (faults) =>
+  Object.fromEntries(Object.entries(about.start).filter(([name]) => faults.has(name)));
 
 /** Asks for the number of a state; one that differs in what is looked at alone has it already. */
 function ask() {
@@ -66,6 +83,11 @@ function moved(values, digits = 4, more = {}) {
 /** Fields, number and point follow at once, all else when these are on the screen. */
 function show() {
   if (!panels) return;
+  const { contact, motion } = store.state;
+  const view = motion === "any" ? "any" : contact === "rigid" ? "rigid" : "map";
+  $("main").dataset.view = view;
+  for (const part of document.querySelectorAll("[data-in]"))
+    part.hidden = !part.dataset.in.split(" ").includes(view);
   const old = answer !== null && answer.state !== store.state && trouble !== null;
   panels.inputs(answer, trouble?.faults ?? new Map());
   panels.number(answer, trouble, old);

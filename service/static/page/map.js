@@ -5,7 +5,8 @@ import { $, attribute, write } from "./dom.js";
 import { caseOf, inputsOf } from "./state.js";
 import { Plot } from "./plot.js";
 import { get } from "./service.js";
-import { about, inPrint, inUnit, inWords, middleOf, show, toUnit, unitAt, whole } from "./words.js";
+import { inLine } from "./number.js";
+import { about, inPrint, inUnit, inWords, show, toUnit, unitAt, whole } from "./words.js";
 
 const { contours } = d3;
 
@@ -128,7 +129,7 @@ export function mapPanel(store, moved, loaded) {
   /** Where a case is on the map, null where it has no place. Without oscillation the service has no
    * ṽ, but v₀ has its place on the case's own axis. */
   function placeOf(one) {
-    if (!one?.groups || store.state.contact === "rigid") return null;
+    if (!one?.groups) return null;
     const { v_tilde: v, y_tilde: y, l0 } = one.groups;
     const size = l0 * 2 * Math.PI * one.inputs.f.value;
     return { v: v ?? (size > 0 ? one.inputs.v0.value / size : Infinity), y: y ?? Infinity };
@@ -143,7 +144,7 @@ export function mapPanel(store, moved, loaded) {
 
   /** Those of the answer, null where it has no axes of its own on this map. */
   function ownSizes() {
-    if (!answer?.groups || store.state.contact === "rigid") return null;
+    if (!answer?.groups) return null;
     if (answer.state.direction !== map.direction) return null;
     const size = sizes(answer);
     return size.v0 > 0 && size[inputsOf(answer.state)[3]] > 0 ? size : null;
@@ -183,9 +184,12 @@ export function mapPanel(store, moved, loaded) {
     text("1", box.x + box.width, top + 20);
   }
 
+  const deviations = (inputs) =>
+    [SPEED, AMPLITUDE[amplitude()]].map((names) => deviationOf(inputs, names));
+
   /** The user's point, with a bar for its deviation or for the interval of k. */
   function point({ v: along, y: up }, inputs) {
-    const [dv, dy] = [SPEED, AMPLITUDE[amplitude()]].map((names) => deviationOf(inputs, names));
+    const [dv, dy] = deviations(inputs);
     if (dv) plot.bar([along * Math.exp(-dv), up], [along * Math.exp(dv), up]);
     if (dy && map.y_tilde.log) plot.bar([along, up * Math.exp(-dy)], [along, up * Math.exp(dy)]);
     const { low, high, value } = inputs.k ?? {};
@@ -197,8 +201,6 @@ export function mapPanel(store, moved, loaded) {
   }
 
   function outside() {
-    if (store.state.contact === "rigid")
-      return "A rigid contact has no point on this map: ṽ and ỹ are infinite.";
     if (!answer?.groups || !map) return "";
     const { v, y } = placeOf(answer);
     const beyond = (value, { start, stop }) => value < start || value > stop;
@@ -209,20 +211,29 @@ export function mapPanel(store, moved, loaded) {
     return names.length ? `Outside of this map: ${names.join(", ")}.` : "";
   }
 
+  /** The user's point in words, with its deviation or over the interval of k. */
+  function yourCase() {
+    const { inputs } = answer;
+    const { v, y } = placeOf(answer);
+    const [dv, dy] = deviations(inputs);
+    const { low, high, value: k } = inputs.k;
+    const said = (at, spread, grows) => {
+      if (high > low && grows) return `${show((at * low) / k, 3)} to ${show((at * high) / k, 3)}`;
+      return spread ? `${show(at, 3)} ± ${show(at * spread, 2)}` : show(at);
+    };
+    const mu =
+      high > low || answer.std ? `µ = ${inLine(answer)}` : `µ/µ₀ = ${show(answer.mu_ratio)}`;
+    return `Your case: ṽ = ${said(v, dv, true)}, ỹ = ${said(y, dy, map.y_tilde.log)}, ${mu}`;
+  }
+
   /** What stands below the map: at the pointer, else at the user's point. */
   function read(place) {
     pointer = place;
     if (!map) return;
     const at = place && plot.holds(place) ? place : null;
     if (!at) {
-      const { v, y } = placeOf(answer) ?? {};
-      const middle = answer ? middleOf(answer) : "";
-      const words = answer?.groups
-        ? `${middle ? `At ${middle}` : "Your case"}: ṽ = ${show(v)}, ỹ = ${show(y)}, ` +
-          `µ/µ₀ = ${show(answer.mu_ratio)}`
-        : "";
       const line = target ? `Dash-dotted line: µ/µ₀ = ${show(target)}.` : "";
-      const said = outside() || words;
+      const said = outside() || (placeOf(answer) ? yourCase() : "");
       write("map-read", whole(line ? `${said.replace(/[^.]$/, "$&.")} ${line}` : said));
       return;
     }
@@ -242,7 +253,7 @@ export function mapPanel(store, moved, loaded) {
 
   /** The values of the case at a place of the map. */
   function pull([x, y]) {
-    if (!answer?.groups?.l0 || store.state.contact === "rigid") return;
+    if (!answer?.groups?.l0) return;
     const size = sizes(answer);
     const place = { v0: plot.x.invert(x), [amplitude()]: plot.y.invert(y) };
     moved(Object.fromEntries(Object.entries(place).map(([name, at]) => [name, at * size[name]])));
@@ -253,7 +264,7 @@ export function mapPanel(store, moved, loaded) {
     pull,
     grab: (moving) => store.drag(moving),
     step(right, up, factor) {
-      if (!answer || store.state.contact === "rigid") return false;
+      if (!answer) return false;
       const names = { v0: right, [amplitude()]: up };
       const changed = Object.entries(names).filter(([, way]) => way);
       moved(
@@ -293,6 +304,5 @@ export function mapPanel(store, moved, loaded) {
         : "Map of µ/µ₀ over dimensionless speed and amplitude",
     );
     read(pointer);
-    return map;
   };
 }

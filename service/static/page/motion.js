@@ -1,21 +1,24 @@
-// The panel "any motion": oscillations in x, y and the load at once, one steady cycle, and which
-// value of an input gives a wanted mean friction.
+// Any motion: oscillations in x, y and the load at once, in the place of one; the friction of one
+// steady cycle, its forces and its path, and which value of an input gives a wanted mean friction.
 import { Channel } from "./ask.js";
-import { copies, motionTexts } from "./copy.js";
+import { motionTexts } from "./copy.js";
 import d3 from "./d3.js";
 import { $, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { list } from "./meanings.js";
 import { Plot } from "./plot.js";
 import { post } from "./service.js";
-import { PARTS, motionOf, partsOf, uncertainOf } from "./state.js";
+import { PARTS, inputsOf, motionOf, partsOf, uncertainOf } from "./state.js";
 import {
   about,
   asTyped,
   called,
+  capital,
   digitsWithin,
   friction,
   inUnit,
+  left,
+  percent,
   prefixed,
   prose,
   show,
@@ -54,13 +57,14 @@ const BEYOND = "too large to be written";
 const TAKEN = 6; // digits of a value that is taken into the form
 const LINE = 14; // pixels between two names
 
-export function motionPanel(store, moved) {
+/** `copy(texts, why)` takes the motion as texts. */
+export function motionPanel(store, moved, copy) {
   let faults = new Map();
   let refused = null;
+  let waits = false; // where the reason mends itself
   let answer, motion, asked, latest, solved, solvedFor, targetRefused;
   const forces = new Plot($("forces"), paintForces);
   const path = new Plot($("path"), paintPath);
-  const copied = copies("motion-copy");
 
   const question = () => ({ ...motionOf(store.state, answer), include: ["inputs"], cycle: true });
   function targetQuestion() {
@@ -76,8 +80,8 @@ export function motionPanel(store, moved) {
       path.redraw();
       draw();
     },
-    (reason, _, reply) => {
-      refused = reason;
+    (reason, calm, reply) => {
+      [refused, waits] = [reason, calm];
       faults = new Map((reply?.faults ?? []).map(({ field, reason: why }) => [field, why]));
       draw();
     },
@@ -98,7 +102,7 @@ export function motionPanel(store, moved) {
   function understood(name) {
     const typed = store.state[name].trim();
     const one = motion?.inputs[name];
-    if (one?.text !== typed) return typed && "amplitude, and @ phase in degrees";
+    if (one?.text !== typed) return "";
     const term = ({ harmonic, amplitude, phase }) =>
       `${harmonic > 1 ? `${harmonic}: ` : ""}${inUnit(LIKE[name], amplitude)} at ${show(phase)}°`;
     const terms = one.harmonics.map(term).join(", ");
@@ -118,11 +122,12 @@ export function motionPanel(store, moved) {
     const none = !partsOf(store.state).includes(name);
     const fault = none ? undefined : faults.get(name);
     const doubt = none ? undefined : doubted(name);
-    const note = none ? about.impossible["ball normal"] : (fault ?? doubt ?? understood(name));
+    const note = none ? about.impossible["ball normal"] : (fault ?? doubt ?? "");
+    const read = none ? "" : understood(name);
     return html`<div class="field ${fault ? "bad" : doubt ? "doubt" : ""}">
       <label for=${`motion-${name}`}
         ><span class="symbol">${called(name)}</span>
-        <span class="label">${MEANINGS[name]}</span></label
+        <span class="label">${MEANINGS[name]}<small>${read}</small></span></label
       >
       <input
         id=${`motion-${name}`}
@@ -138,11 +143,25 @@ export function motionPanel(store, moved) {
     </div>`;
   }
 
+  /** The number of the motion, and what it says, in the card of the answer. */
+  function headline(known, error) {
+    const { mu_macro: mu, inputs, stick_fraction: stick } = motion;
+    const value = known(mu);
+    write("motion-mu", value);
+    $("motion-number").classList.toggle("long", value.length > 12);
+    const share = value === "0" ? 0 : mu / inputs.mu0.value;
+    write("motion-share", share < 0 ? "The motion drives the body forward" : left(percent(share)));
+    const parts = stick > 0 && stick < 1 ? `Sticks for ${percent(stick)} of each period` : "";
+    write("motion-regime", parts || (stick ? "At rest" : "Continuous sliding"));
+    write("short", `µ = ${value}`);
+  }
+
   function numbers() {
     const { error_estimate: error, mu_macro: mu, inputs } = motion;
     const most = store.state.digits === "all" ? 15 : 4;
     const known = (one) =>
       Math.abs(one) <= error ? "0" : friction(one, Math.min(digitsWithin(one, error), most));
+    headline(known, error);
     const force = Math.abs(mu) <= error ? 0 : mu * inputs.Fz.value;
     list("motion-values", [
       [
@@ -222,20 +241,13 @@ export function motionPanel(store, moved) {
 
   function draw() {
     const { state } = store;
-    render(Object.keys(PARTS).map(field), $("motion-fields"));
+    render(Object.keys(PARTS).map(field), $("motion-form"));
     if (motion) numbers();
-    $("motion-meanings").hidden = !motion;
     render(roots(), $("motion-roots"));
-    const atFields =
-      faults.size && [...faults.keys()].every((name) => Object.hasOwn(PARTS, name.split(",")[0]));
-    write("motion-status", refused && !atFields ? prose(refused) : "");
+    tell();
+    document.querySelector("[data-meanings=motion-values]").disabled = !motion;
     const remarks = (motion?.remarks ?? []).filter((one) => !isDoubt(one));
-    const driven = motion?.mu_macro < -motion?.error_estimate;
-    const all = [
-      driven ? "µ is negative: the motion drives the body forward." : "",
-      withoutDeviations(),
-      ...remarks.map(({ text }) => prose(text)),
-    ].filter(Boolean);
+    const all = [withoutDeviations(), ...remarks.map(({ text }) => prose(text))].filter(Boolean);
     render(
       all.map((words) => html`<li>${words}</li>`),
       $("motion-doubt"),
@@ -243,8 +255,8 @@ export function motionPanel(store, moved) {
     $("motion-unknown").value = state.motion_unknown;
     $("motion-target").value = state.motion_target;
     const old = motion && JSON.stringify(question()) !== asked;
-    for (const part of ["motion-values", "forces", "path"])
-      $(part).classList.toggle("old", Boolean(old));
+    for (const part of document.querySelectorAll(".of-motion"))
+      part.classList.toggle("old", Boolean(old));
     const other = Boolean(solved && JSON.stringify(targetQuestion()) !== solvedFor);
     $("motion-roots").classList.toggle("old", other);
     write(
@@ -252,8 +264,18 @@ export function motionPanel(store, moved) {
       targetRefused ? prose(targetRefused) : other ? "This was asked with other values." : "",
     );
     $("motion-target-status").classList.toggle("bad", Boolean(targetRefused));
-    const why = refused ?? (old || !motion ? "the motion is not computed yet." : null);
-    copied(motionTexts(state, answer), why);
+    copy(motionTexts(state, answer), !refused);
+  }
+
+  /** Why there is no newer number; what is wrong with a field stands beside it. */
+  function tell() {
+    const names = [...new Set([...faults.keys()].map((name) => name.split(",")[0]))];
+    const fields = [...inputsOf(store.state), ...Object.keys(PARTS)];
+    const told = names.length > 0 && names.every((name) => fields.includes(name));
+    const check = `check ${names.map(called).join(", ")}`;
+    write("motion-status", refused ? (told ? `${capital(check)}.` : prose(refused)) : "");
+    $("motion-status").classList.toggle("bad", refused !== null && !waits);
+    if (refused && told) write("short", `µ = –, ${check}`);
   }
 
   function padded(values) {
@@ -336,10 +358,9 @@ export function motionPanel(store, moved) {
     $("motion-unknown"),
   );
 
-  /** Computes the motion of a state whose case is answered or refused, while its panel is open. */
+  /** Computes the motion of a state whose case is answered or refused. */
   return (reply, settled) => {
     answer = reply;
-    if (store.state.panel !== "motion") return;
     const body = question();
     const words = JSON.stringify(body);
     if (settled && words !== latest) {

@@ -4,7 +4,7 @@ import { Channel } from "./ask.js";
 import { $, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { post } from "./service.js";
-import { caseAround, caseOf } from "./state.js";
+import { caseAround, caseOf, inputsOf } from "./state.js";
 import {
   about,
   around,
@@ -14,6 +14,7 @@ import {
   friction,
   inUnit,
   inWords,
+  left,
   middleOf,
   numberOf,
   percent,
@@ -24,7 +25,7 @@ import {
   withEnds,
 } from "./words.js";
 
-const KNOWN = "k decides";
+const STIFFNESS = "k is known"; // row of the model
 const FEW = 4; // digits of the number
 
 const symbolOf = (name) => about.inputs[name === "omega" ? "f" : name].symbol;
@@ -47,11 +48,22 @@ export function headline(answer, all) {
   return { value, std: deviation };
 }
 
-/** The number in one line of a phone, with what of µ₀ is left; or which fields to check. */
-function shortOf(answer, faults = []) {
-  if (faults.length) return `µ = –, check ${faults.map(called).join(", ")}`;
+/** Both ends of what a deviation or an interval leaves open; null where neither is given. */
+export function endsOf({ mu_macro: mu, std, mu_macro_low: low, mu_macro_high: high }) {
+  if (high > low) return [low, high];
+  return std ? [Math.max(mu - std, 0), mu + std] : null;
+}
+
+/** µ of a case in a line of text, as the headline has it. */
+export function inLine(answer) {
   const { value, std } = headline(answer, false);
-  return `µ = ${value}${std ? ` ± ${std}` : ""}, ${shareOf(answer)} left`;
+  return std ? `${value} ± ${std}` : value;
+}
+
+/** The number in one line of a phone, with what of µ₀ is left; or which fields to check. */
+function shortOf(answer, faults) {
+  if (faults.length) return `µ = –, check ${faults.map(called).join(", ")}`;
+  return `µ = ${inLine(answer)}, ${shareOf(answer)} left`;
 }
 
 /** The share of µ₀ that is left: a value, or both ends of an interval. */
@@ -62,12 +74,7 @@ function shareOf({ mu_macro_low: low, mu_macro_high: high, mu_ratio: ratio, inpu
 }
 
 /** What of µ₀ is left, in words; where an input has a deviation, the share has one, too. */
-export function remains(answer) {
-  const share = shareOf(answer);
-  if (answer.mu_ratio === 0) return "Nothing of µ₀ is left";
-  const much = share === "100 %" ? "all" : share;
-  return capital(`${answer.std ? "about " : ""}${much} of µ₀ is left`);
-}
+const remains = (answer) => left(shareOf(answer), answer.std ? "about " : "");
 
 /** The regimes of an interval of k, and where one begins: a law over it. */
 function regimes({ regime, border }, unit) {
@@ -85,6 +92,32 @@ function going(answer) {
   if (middle) return `${name} at ${middle}, the middle of the interval`;
   const stick = answer.stick_fraction;
   return stick > 0 && stick < 1 ? `${name}: sticks for ${percent(stick)} of each period` : name;
+}
+
+/** Per cent that µ changes when an input grows by 1 %, by input; null where it has none. */
+export function sensitivities({ gradient, mu_macro: mu, inputs }) {
+  if (!gradient || !mu) return [];
+  return Object.entries(gradient).map(([name, slope]) => {
+    const [input, per] = name === "omega" ? ["f", 2 * Math.PI] : [name, 1];
+    const value = numberOf(inputs[input]);
+    return [input, slope === null || value === undefined ? null : (slope * per * value) / mu];
+  });
+}
+
+/** The inputs that change µ most, as far as two digits tell them apart, before what is said of k. */
+function deciding(answer, words) {
+  const size = ([, share]) => Number(Math.abs(share).toPrecision(2));
+  const shares = sensitivities(answer);
+  const most = Math.max(0, ...shares.map(size));
+  const first = shares.filter((one) => most && size(one) === most);
+  if (!first.length) return { row: "stiffness", words };
+  const names = first.map(([name]) => symbolOf(name)).join(" and ");
+  const each =
+    first.length > 1 ? `of each changes µ by ${most}` : `more changes µ by ${show(first[0][1], 2)}`;
+  return {
+    row: `${names} decide${first.length > 1 ? "" : "s"} most`,
+    words: first.some(([name]) => name === "k") ? words : `1 % ${each} %. ${words}`,
+  };
 }
 
 /** Where the deviation of the number comes from. */
@@ -130,14 +163,17 @@ function sayings(answer) {
   const named = {
     std: "standard deviation",
     units: "check the units",
-    "k is known": KNOWN,
+    [STIFFNESS]: "rigid contact", // which is said of no other one as a remark
     ...(answer.state.contact === "ball" && { "one spring": "a ball" }),
   };
   const rows = [...remarks, ...model.filter(({ row }) => !said.has(row))].map(({ row, text }) => ({
-    row: named[row] ?? row,
-    words: capital(sentence(text, inputs)),
+    known: row === STIFFNESS,
+    words: capital(sentence(text.replace(/^rigid: /, ""), inputs)),
     doubt: said.has(row) || DOUBTS.includes(row),
+    row: named[row] ?? row,
   }));
+  for (const one of rows)
+    if (one.known && !one.doubt) Object.assign(one, deciding(answer, one.words));
   const unit = inputs.k.unit ?? undefined;
   const ends = [inputs.k.low, inputs.k.high].map((end) => inUnit("k", end, unit));
   const middle =
@@ -149,7 +185,7 @@ function sayings(answer) {
     { row: "interval", words: middle },
     { row: "uncertainty", words: variance(answer) },
   ].filter(({ words }) => words);
-  const known = rows.filter(({ row }) => row === KNOWN);
+  const known = rows.filter((one) => one.known);
   const doubts = rows.filter(({ doubt }) => doubt);
   return [...new Set([...doubts, ...own, ...known, ...rows])];
 }
@@ -188,23 +224,30 @@ export function numberPanel(store) {
     const [before, now] = [caseOf(state), caseOf(store.state)];
     const names = Object.keys(before).filter((name) => before[name] !== now[name]);
     const text = (name) =>
-      about.inputs[name] ? `${symbolOf(name)} = ${before[name]}` : before[name];
-    return whole(names.map(text).join(", "));
+      about.inputs[name]
+        ? `${symbolOf(name)} = ${before[name]}`
+        : `${about.titles[name].toLowerCase()} ${before[name]}`;
+    return names.map(text).join(", ");
+  }
+
+  /** Why the number is not that of the form, which a field tells of itself, and whose it is. */
+  function reasons(trouble, faults, shown) {
+    if (!trouble?.text) return "";
+    const told = faults.length && faults.every((name) => inputsOf(store.state).includes(name));
+    const reason = told
+      ? `Check ${faults.map(called).join(", ")}.`
+      : prose(trouble.text).replace(/[^.!?]$/, "$&.");
+    return whole(shown ? `${reason} The number shown is that of ${otherwise(shown)}.` : reason);
   }
 
   $("number").replaceChildren(); // what stands there until the first answer
   return (answer, trouble, old) => {
     const faults = [...(trouble?.faults?.keys() ?? [])];
-    if (!store.dragged) write("shown", answer && old ? `Shown: ${otherwise(answer.state)}` : "");
-    const reason = trouble?.text ? prose(trouble.text).replace(/[^.!?]$/, "$&.") : "";
-    write("status", reason && old && trouble.calm ? `${reason} The last answer stays.` : reason);
+    write("status", reasons(trouble, faults, old ? answer.state : null));
     $("status").classList.toggle("bad", Boolean(trouble && !trouble.calm));
     for (const part of document.querySelectorAll(".result")) part.classList.toggle("old", old);
-    $("number").classList.toggle("none", !answer && Boolean(trouble) && !trouble.calm);
     if (!answer) {
-      const none = trouble && !trouble.calm ? "–" : "…";
-      render(html`<output id="mu" for="fields">${none}</output>`, $("number"));
-      write("short", faults.length ? shortOf(null, faults) : "");
+      render(html`<output id="mu" for="fields">…</output>`, $("number"));
       return;
     }
     const { value, std } = headline(answer, store.state.digits === "all");
@@ -216,7 +259,7 @@ export function numberPanel(store) {
     write("share", remains(answer));
     write("regime", whole(spread(answer)));
     $("regime").classList.toggle("two", middleOf(answer) !== "");
-    write("short", shortOf(answer, old ? faults : []));
+    if (store.state.motion === "one") write("short", shortOf(answer, old ? faults : []));
     $("advice").classList.toggle("old", old || store.dragged);
     if (store.dragged) return; // words may grow, and would move the map that is dragged
     const [first, ...rest] = sayings(answer);

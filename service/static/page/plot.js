@@ -211,6 +211,14 @@ export class Plot {
     title(y.title, `translate(${this.width - 12} ${box.y + box.height / 2}) rotate(90)`);
   }
 
+  /** A cut in the axis of y, which does not begin at 0. */
+  cut() {
+    const { box, over } = this;
+    const [left, foot] = [box.x - 6, box.y + box.height - 5];
+    over.append("path").attr("class", "gap").attr("d", `M${left} ${foot}l12 -5v-5l-12 5Z`);
+    over.append("path").attr("class", "cut").attr("d", `M${left} ${foot}l12 -5m0 -5l-12 5`);
+  }
+
   /**
    * A strip below the axis of x, of so many pixels, with an axis of its own that has 0 in its
    * middle; returns its scale.
@@ -222,7 +230,10 @@ export class Plot {
       .range([height - 6, height - pixels + 6]);
     const axis = over.append("g").attr("class", "axis").attr("transform", `translate(${box.x} 0)`);
     axis.call(ticked(axisLeft(scale).tickSizeOuter(0), scale, 30));
-    over.append("path").attr("class", "rule").attr("d", `M${box.x} ${scale(0)}h${box.width}`);
+    over
+      .append("path")
+      .attr("class", "rule")
+      .attr("d", `M${box.x} ${scale(0)}h${box.width}`);
     this.text(title, box.x, height - pixels - 8, "note", "start");
     return scale;
   }

@@ -4,6 +4,7 @@ import { Channel } from "./ask.js";
 import { $, write } from "./dom.js";
 import { html, nothing, render, svg } from "../lib/lit-html.js";
 import { list } from "./meanings.js";
+import { inLine, sensitivities } from "./number.js";
 import { post } from "./service.js";
 import { caseAround, inputsOf, kindOf } from "./state.js";
 import {
@@ -12,10 +13,10 @@ import {
   inUnit,
   inWords,
   middleOf,
-  numberOf,
   prefixed,
   show,
   unitAt,
+  whole,
 } from "./words.js";
 
 /**
@@ -48,7 +49,6 @@ function tabs(id, chosen = () => {}) {
   return (name) => turn(buttons.find((one) => one.id === `tab-${name}`));
 }
 
-const NONE_YET = html`<p class="hint">There is no number yet.</p>`;
 const MOST = 7; // digits that have room beside a unit
 
 /** The other numbers of a case, as `list` takes them. */
@@ -68,12 +68,15 @@ function numbers(answer, all) {
     lacks[name] ? [words, lacks[name]] : ["rigid contact", "it is not given for a rigid contact"];
   const amplitude = inputs.y0?.value;
   // the service has no group that is not finite, nor ṽ where nothing oscillates
+  const rigid = state.contact === "rigid";
   const still = groups.y_tilde === 0;
   const group = (name) => {
-    const value = groups[name] ?? (still ? null : Infinity);
+    const value = groups[name] ?? (still || rigid ? null : Infinity);
     return value === null ? null : show(value, digits);
   };
-  const why = ["not shaken", "it is not given where nothing oscillates"];
+  const why = rigid
+    ? ["rigid contact", "it is infinite for a rigid contact"]
+    : ["not shaken", "it is not given where nothing oscillates"];
   const amount = (value, unit, some = digits) =>
     value === null || value === undefined ? null : prefixed(value, unit, some);
   return [
@@ -126,22 +129,17 @@ function numbers(answer, all) {
   ];
 }
 
-const signed = (share) => `${share < 0 ? "−" : "+"}${Math.abs(share).toFixed(3)} %`;
+const signed = (share) => `${share < 0 ? "−" : "+"}${Math.abs(share).toFixed(2)} %`;
 /** Why an input has no sensitivity. */
 const none = (name) => (name === "k" ? "rigid" : "kink at 0");
 
 /** Per cent that µ changes when an input grows by 1 %; where inputs have deviations, what each of
  * them has of the variance of µ. */
-function bars({ gradient, mu_macro: mu, inputs, std_share: variance }) {
-  if (!gradient || !mu) return html`<p class="hint">There is none: µ is 0.</p>`;
-  const names = Object.keys(gradient);
-  const shares = names.map((name) => {
-    const [input, per] = name === "omega" ? ["f", 2 * Math.PI] : [name, 1];
-    const value = numberOf(inputs[input]);
-    const share =
-      gradient[name] === null || value === undefined ? null : (gradient[name] * per * value) / mu;
-    return [input, share, variance && Math.round(100 * (variance[name] ?? 0))];
-  });
+function bars(answer) {
+  const { std_share: variance } = answer;
+  const shares = sensitivities(answer);
+  if (!shares.length) return html`<p class="hint">There is none: µ is 0.</p>`;
+  const part = (name) => Math.round(100 * (variance[name === "f" ? "omega" : name] ?? 0));
   const most = Math.max(1, ...shares.map(([, share]) => Math.abs(share)));
   return html`<table>
     ${
@@ -155,7 +153,7 @@ function bars({ gradient, mu_macro: mu, inputs, std_share: variance }) {
         : nothing
     }
     <tbody>
-      ${shares.map(([name, share, part]) => {
+      ${shares.map(([name, share]) => {
         const width = (50 * Math.abs(share)) / most;
         return html`<tr>
           <th scope="row">${about.inputs[name].symbol}</th>
@@ -172,7 +170,11 @@ function bars({ gradient, mu_macro: mu, inputs, std_share: variance }) {
             </svg>
           </td>
           <td class="change">${share === null ? `– ${none(name)}` : signed(share)}</td>
-          ${variance ? html`<td class="variance">${part ? `${part} %` : "–"}</td>` : nothing}
+          ${
+            variance
+              ? html`<td class="variance">${part(name) ? `${part(name)} %` : "–"}</td>`
+              : nothing
+          }
         </tr>`;
       })}
     </tbody>
@@ -272,12 +274,12 @@ export function sidePanel(store, moved, found) {
     render(names.map(option), $("unknown"));
     $("quantity").value = store.state.quantity;
     $("target").value = store.state.target;
-    for (const id of ["values", "bars"]) if (!answer) render(NONE_YET, $(id));
     document.querySelector("[data-meanings=values]").disabled = !answer;
     if (!answer) return;
     const origin = `All are from the block ${answer.source} of the table ${answer.table.id}.`;
     const middle = middleOf(answer);
-    write("middle", middle && `At ${middle}, the middle of the interval.`);
+    const rest = middle ? `at ${middle}` : answer.std && "without ±";
+    write("middle", rest ? whole(`µ = ${inLine(answer)}; all else ${rest}.`) : "");
     list("values", numbers(answer, store.state.digits === "all"), origin);
     render(bars(answer), $("bars"));
     compare();

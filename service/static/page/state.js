@@ -16,6 +16,7 @@ export const inputsOf = ({ direction }) => [
 const CHOICES = {
   contact: ["spring", "ball", "rigid"],
   direction: ["across", "along", "normal"],
+  motion: ["one", "any"], // oscillation, or several at once
   along: ["v0", "mu0", "Fz", "k", "y0", "Fz_amplitude", "f"],
   scale: ["log", "linear"],
   axis: ["fit", "zero"], // of µ in the law
@@ -23,7 +24,7 @@ const CHOICES = {
   unknown: ["y0", "mu0", "Fz", "k", "Fz_amplitude", "f", "v0"],
   quantity: ["mu_ratio", "mu_macro"],
   side: ["values", "bars", "target"],
-  panel: ["none", "stiffness", "fit", "motion"],
+  panel: ["none", "stiffness", "fit"],
   motion_unknown: [
     "v0",
     "k",
@@ -142,12 +143,14 @@ export function caseAround(state, answer, name, exact = true) {
   return grows && exponent ? { ...question, stiffness_exponent: exponent } : question;
 }
 
-/** The state with what is chosen of the inputs that the direction has. */
-function allowed(state) {
+/** The state without what its contact and its oscillation do not have. */
+function allowed(chosen) {
+  const state = chosen.motion === "any" ? { ...chosen, direction: "across" } : chosen;
   const names = inputsOf(state);
   const other = state.direction === "normal" ? "Fz_amplitude" : "y0";
   const shown = (name) => (names.includes(name) ? name : other);
-  return { ...state, along: shown(state.along), unknown: shown(state.unknown) };
+  const panel = state.contact === "rigid" ? "none" : state.panel; // which are for k
+  return { ...state, along: shown(state.along), unknown: shown(state.unknown), panel };
 }
 
 /** One state and those who follow it; `change` makes an entry of the history. */

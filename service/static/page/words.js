@@ -119,8 +119,14 @@ export function withDeviation(value, std) {
 
 /** A share as a person says it; what is not all of it is below 100 %. */
 export function percent(share) {
-  const nines = -Math.floor(Math.log10(1 - share));
+  const nines = -Math.floor(Math.log10(Math.abs(1 - share)));
   return `${show(100 * share, Math.min(Math.max(nines, 2), 4))} %`;
+}
+
+/** What of µ₀ is left, in words, for a share in per cent. */
+export function left(share, some = "") {
+  if (share === "0 %") return "Nothing of µ₀ is left";
+  return capital(`${some}${share === "100 %" ? "all" : share} of µ₀ is left`);
 }
 
 /** The digits of a value that its error bound leaves. */
@@ -175,7 +181,7 @@ export function middleOf({ mu_macro_low: low, mu_macro_high: high, inputs }) {
 /** A text in which no equation is broken over two lines. */
 export const whole = (text) =>
   text
-    .replace(/ ([=≈±]) |(?<=\d) (?=[µa-zA-Z])/g, (gap) => gap.replaceAll(" ", "\u00a0"))
+    .replace(/ ([=≈±]) | to (?=\d)|(?<=\d) (?=[%µa-zA-Z])/g, (gap) => gap.replaceAll(" ", "\u00a0"))
     .replaceAll("/", "/\u2060");
 
 /** A field of a request as the page calls it. */
