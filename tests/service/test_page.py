@@ -400,6 +400,11 @@ def test_every_box_holds_its_text_on_paper(open_page: Any, address: str) -> None
     with page.paper():
         assert page.run(CUT) == []
         assert page.run(COVERED) == []
+        for plot in page.rects(".plot:not(#fit-plot)"):
+            assert plot["width"] >= 1.4 * plot["height"]  # none is squeezed
+        # no number is parted from its unit
+        heights = {round(one["height"]) for one in page.rects("#values dd, #motion-values dd")}
+        assert len(heights - {0}) == 1
 
 
 @pytest.mark.parametrize("width", WIDTHS)
@@ -488,6 +493,7 @@ def test_the_page_is_accessible(open_page: Any, repository: Path, width: Any) ->
     page.click("[name=direction][value=any]")
     page.click("#motion-target-form button")
     assert inaccessible(page, repository) == {}
+    page.click("[name=direction][value=across]")
     page.click("[data-meanings=values]")
     assert inaccessible(page, repository) == {}
     page.click("#meanings button")

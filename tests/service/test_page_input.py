@@ -784,3 +784,6 @@ def test_the_head_of_a_phone_is_one_row(open_page: Any, width: int) -> None:
     title, links = page.find("h1 .name").rect, page.find("nav").rect
     assert links["y"] < title["y"] + title["height"]
     assert links["x"] >= title["x"] + title["width"]
+    # what leads to the cards begins where they do, and no keys are spoken of
+    assert page.find("#jump button").rect["x"] == page.find("#inputs").rect["x"]
+    assert not page.find(".by-keys").is_displayed()

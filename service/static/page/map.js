@@ -41,7 +41,9 @@ export function mapPanel(store, moved, loaded) {
       );
       loaded();
     },
-    (reason) => write("map-read", reason ?? ""),
+    (reason, calm) => {
+      if (!map || !calm) write("map-read", reason ?? ""); // else it is told beside the number
+    },
   );
 
   /** Where a place of a contour, in cells of the grid, is in the plot. */

@@ -120,7 +120,7 @@ export function withDeviation(value, std) {
 /** A share as a person says it; what is not all of it is below 100 %. */
 export function percent(share) {
   const nines = -Math.floor(Math.log10(Math.abs(1 - share)));
-  return `${show(100 * share, Math.min(Math.max(nines, 2), 4))} %`;
+  return `${show(100 * share, Math.min(Math.max(nines, share > 1 ? 3 : 2), 4))} %`;
 }
 
 /** What of µ₀ is left, in words, for a share in per cent. */
