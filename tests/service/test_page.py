@@ -450,12 +450,15 @@ def test_a_clamp_is_found(open_page: Any) -> None:
     assert any("#advice" in one for one in page.run(CUT))
 
 
-def test_one_screen_holds_inputs_number_and_map(open_page: Any) -> None:
-    page = open_page(width=1280, height=800)
+@pytest.mark.parametrize(("width", "height"), [(1280, 800), (1440, 900), (1920, 1080)])
+def test_one_screen_holds_inputs_number_and_map(open_page: Any, width: int, height: int) -> None:
+    page = open_page(width=width, height=height)
     for name in ("inputs", "answer", "map-section", "law-section", "side", "copy"):
         box = page.find(f"#{name}").rect
         assert box["y"] >= 0
-        assert box["y"] + box["height"] <= 800, name
+        assert box["y"] + box["height"] <= height, name
+    field, card = page.find("#copy-text").rect, page.find("#copy").rect
+    assert card["y"] + card["height"] - field["y"] - field["height"] <= 14  # and no blank below it
 
 
 def inaccessible(page: Any, repository: Path) -> Any:

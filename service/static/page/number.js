@@ -104,7 +104,7 @@ export function sensitivities({ gradient, mu_macro: mu, inputs }) {
   });
 }
 
-/** The inputs that change µ most, as far as two digits tell them apart, before what is said of k. */
+/** The inputs that change µ most, as far as two digits tell, before what is said of k. */
 function deciding(answer, words) {
   const size = ([, share]) => Number(Math.abs(share).toPrecision(2));
   const shares = sensitivities(answer);
