@@ -39,7 +39,7 @@ from mumacro.inputs.units import belongs_to_value, choose_unit, format_number, t
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import names_in
 from mumacro.questions.solutions import Solution
-from mumacro.results import Note, listed
+from mumacro.results import Note, Result, listed
 from mumacro.surrogate import Surrogate
 
 ABOUT_INPUTS = f"""\
@@ -456,6 +456,12 @@ def in_columns(rows: Iterable[Sequence[str]]) -> str:
         for column, width in zip(columns, widths, strict=True)
     )
     return "\n".join("  ".join(row).rstrip() for row in zip(*cells_of_rows, strict=True))
+
+
+def in_full(result: Result, *more: tuple[str, ...]) -> str:
+    """Return a result about one thing with all of its rows, ``more`` rows and its notes."""
+    _, rows, below = result._in_full()
+    return "\n".join([in_columns([*(rows or ()), *more]), *below])
 
 
 def note_lines(notes: Iterable[Note]) -> list[str]:

@@ -1,19 +1,17 @@
 """Run ``mumacro fit``: fit k and mu0 to measured points in a file."""
 
-import math
 import warnings
 from collections.abc import Sequence
 
 from mumacro import plotting
 from mumacro.cli import common
-from mumacro.cli.common import OneLineParser, UsageError, in_columns, open_table
+from mumacro.cli.common import OneLineParser, UsageError, open_table
 from mumacro.cli.table_format import add_format, dialect_in, fit_to, read_file
 from mumacro.fits.fit import fit
 from mumacro.fits.fitted import Fit
 from mumacro.fits.measured_points import STD, UNKNOWNS, read_points, unknowns_beside
 from mumacro.inputs.fields import AMPLITUDE, kind_of
 from mumacro.inputs.units import unit_of
-from mumacro.validity import digits
 
 EXAMPLE = 'mumacro fit measured.csv "Fz=10N y0=2um f=20kHz" -o fit.png'
 _COLUMNS = f"""\
@@ -76,27 +74,5 @@ def run(words: Sequence[str]) -> str:
         for name, column in result.points.items()
     }
     columns |= {"mu_macro fitted": result.points["mu_macro"] - result.residuals}
-    text = _text(result)
+    text = common.in_full(result)
     return common.present(options, result, columns, text, surrogate, **plotting.OF_FIT)
-
-
-def _text(result: Fit) -> str:
-    """Return the text of the result: values with standard deviations and intervals, the scatter,
-    other solutions, warnings."""
-    rows: list[Sequence[str]] = []
-    for name, value in result.values.items():
-        off, (low, high) = result.std[name], result.interval[name]
-        form = f".{digits(off / value if 0.0 < value < math.inf else 0.0)}g"
-        number = "rigid" if math.isinf(value) else f"{value:{form}}"
-        ends = f"95 %: {low:{form}} to {high:{form}}"
-        rows.append((name, number, f"[{unit_of(name)}]", f"+- {off:.2g}", ends))
-    if STD in result.points:
-        rows.append(("chi2", f"{result.reduced_chi2:.3g}", "[-]", "over the degrees of freedom"))
-    else:
-        scatter = f"{math.sqrt(result.reduced_chi2):.2g}"
-        rows.append(("scatter", scatter, "[-]", "of mu_macro about the fit"))
-    rows.append(("points", str(result.residuals.size), "", f"{result.contact}, {result.direction}"))
-    for i, one in enumerate(result.solutions[1:], 2):
-        values = ", ".join(f"{name} = {one[name]:.4g} {unit_of(name)}" for name in result.values)
-        rows.append((f"solution {i}", values))
-    return "\n".join([in_columns(rows), *(note.line for note in result.notes)])

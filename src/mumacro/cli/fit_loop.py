@@ -7,11 +7,10 @@ from functools import partial
 
 from mumacro import plotting
 from mumacro.cli import common
-from mumacro.cli.common import OneLineParser, UsageError, in_columns
+from mumacro.cli.common import OneLineParser, UsageError
 from mumacro.cli.table_format import add_format, dialect_in, fit_to, read_file
 from mumacro.errors import InputError
 from mumacro.fits.loop import fit_loop
-from mumacro.fits.loop_fitted import LoopFit
 from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.case import read_one
 from mumacro.inputs.text_tables import read_numbers
@@ -75,7 +74,9 @@ def run(words: Sequence[str]) -> str:
     found = fit_to("fit-loop", options.loop, table, fit, names)
     heads = ("displacement [m]", "force [N]", "Fz [N]", "force fitted [N]")
     in_si = dict(zip(heads, found.loop.values(), strict=True))
-    return common.present(options, found, in_si, _text(found), **plotting.OF_FIT)
+    samples = ("samples", str(found.residuals.size), "", f"{found.contact}, {found.cycles} cycles")
+    text = common.in_full(found, samples)
+    return common.present(options, found, in_si, text, **plotting.OF_FIT)
 
 
 def _load(words: Sequence[str], column: str | None) -> dict[str, float]:
@@ -92,9 +93,3 @@ def _load(words: Sequence[str], column: str | None) -> dict[str, float]:
         return {"Fz": read_one("Fz", value.strip())}
     except InputError as error:
         raise UsageError(str(error)) from None
-
-
-def _text(found: LoopFit) -> str:
-    """Return the text of the result: values with intervals, energy, scatter, and notes."""
-    samples = ("samples", str(found.residuals.size), "", f"{found.contact}, {found.cycles} cycles")
-    return "\n".join([in_columns([*found._rows(), samples]), *(note.line for note in found.notes)])

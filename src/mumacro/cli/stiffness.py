@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mumacro.cli import common
-from mumacro.cli.common import OneLineParser, UsageError, as_json, in_columns
+from mumacro.cli.common import OneLineParser, UsageError, as_json
 from mumacro.inputs.case import read_one
 from mumacro.stiffness import (
     ARGUMENTS,
@@ -86,6 +86,5 @@ def run(words: Sequence[str]) -> str:
     if options.json:
         return as_json({"geometry": options.geometry, **contact.to_dict()})
     option = "" if contact.contact == "spring" else f" --contact {contact.contact}"
-    rows = contact._rows()  # with four digits, as materials and geometry give no more
-    rows += [("contact", contact.contact), ("paste", f"k={contact.k:.4g}{option}")]
-    return "\n".join([in_columns(rows), *(note.line for note in contact.notes)])
+    paste = ("paste", f"k={contact.k:.4g}{option}")
+    return common.in_full(contact, ("contact", contact.contact), paste)

@@ -11,8 +11,10 @@ from mumacro import plotting
 from mumacro.fits.measured_points import STD, UNKNOWNS, Measured
 from mumacro.fits.profile import quantile
 from mumacro.inputs.fields import RIGID
+from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.results import Note, Result, Rows
+from mumacro.validity import digits
 
 _CURVE = 200  # points of the fitted law
 
@@ -234,11 +236,24 @@ class Fit(Result):
         return []
 
     def _in_full(self) -> tuple[str, Rows | None, list[str]]:
-        """Return the values with their deviations and intervals as text."""
-        rows: Rows = [
-            (name, f"{x:.4g}", f"± {self.std[name]:.2g}", "95 %: {:.4g} to {:.4g}".format(*ends))
-            for (name, x), ends in zip(self.values.items(), self.interval.values(), strict=True)
-        ]
+        """Return the values with their deviations and intervals as text, the scatter, and the
+        other solutions."""
+        rows: Rows = []
+        for name, value in self.values.items():
+            off, (low, high) = self.std[name], self.interval[name]
+            form = f".{digits(off / value if 0.0 < value < math.inf else 0.0)}g"
+            number = "rigid" if math.isinf(value) else f"{value:{form}}"
+            ends = f"95 %: {low:{form}} to {high:{form}}"
+            rows.append((name, number, f"[{unit_of(name)}]", f"+- {off:.2g}", ends))
+        if STD in self.points:
+            rows.append(("chi2", f"{self.reduced_chi2:.3g}", "[-]", "over the degrees of freedom"))
+        else:
+            scatter = f"{math.sqrt(self.reduced_chi2):.2g}"
+            rows.append(("scatter", scatter, "[-]", "of mu_macro about the fit"))
+        rows.append(("points", str(self.residuals.size), "", f"{self.contact}, {self.direction}"))
+        for i, one in enumerate(self.solutions[1:], 2):
+            values = ", ".join(f"{name} = {one[name]:.4g} {unit_of(name)}" for name in self.values)
+            rows.append((f"solution {i}", values))
         return self._heading(), rows, self._below()
 
 
