@@ -81,11 +81,8 @@ def fit(
     >>> f"{result.values['k']:.2g} {result.values['mu0']:.3f}"
     '1e+06 0.300'
     """
-    names = (
-        (unknowns,) if isinstance(unknowns, str) else None if unknowns is None else tuple(unknowns)
-    )
-    problem = _Problem(data, names, contact, direction, surrogate or _bundled_surrogate(), fixed)
-    result = problem.solve()
+    table = surrogate or _bundled_surrogate()
+    result = _Problem(data, unknowns, contact, direction, table, fixed).solve()
     for text in result.warnings:
         warnings.warn(text, stacklevel=3)  # errstate wraps this function
     return result
@@ -116,7 +113,9 @@ class _Problem(Measured):
         def model(s: Array, slopes: bool) -> tuple[Array, Array]:
             with np.errstate(over="ignore"):
                 x = np.exp(s)
-            mu, slope = self.model_along(along, x, np.ones(x.size) if has_factor else None, slopes)
+            values = ({"mu0": 1.0} if has_factor else {}) | {along: x[:, None]}
+            mu, by_name = self.model(values, self.columns, slopes)
+            slope = by_name[along] if slopes else np.zeros_like(mu)
             steps = slope * np.where(np.isfinite(x), x, 0.0)[:, None]
             return mu * self.weight, np.nan_to_num(steps, posinf=0.0, neginf=0.0) * self.weight
 

@@ -1,7 +1,7 @@
 """Check the columns of measured points, and evaluate the model at them, for
 :mod:`mumacro.fits.fit`."""
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -71,17 +71,19 @@ class Measured:
     def __init__(
         self,
         data: Any,
-        unknowns: tuple[str, ...] | None,
+        unknowns: str | Sequence[str] | None,
         contact: str,
         direction: str,
         surrogate: Surrogate,
         fixed: Mapping[str, Any],
     ) -> None:
-        unknown_columns = select("data", data, UNKNOWNS)
-        unknowns = tuple(unknowns_beside(unknown_columns)) if unknowns is None else unknowns
+        if unknowns is None:
+            unknowns = unknowns_beside(select("data", data, UNKNOWNS))
+        unknowns = (unknowns,) if isinstance(unknowns, str) else tuple(unknowns)
         if not unknowns or len(set(unknowns)) != len(unknowns) or set(unknowns) - set(UNKNOWNS):
             raise InputError("unknowns", unknowns, 'one or both of "k" and "mu0"')
-        self.unknowns, self.surrogate = unknowns, surrogate
+        self.unknowns = tuple(name for name in UNKNOWNS if name in unknowns)
+        self.surrogate = surrogate
         self.kind = kind_of(contact, direction)
         self.amplitude = self.kind.amplitude
         self._read(self._inputs(data, fixed))
@@ -234,28 +236,16 @@ class Measured:
     # --- the model --------------------------------------------------------------------------------
 
     def model(
-        self, values: Mapping[str, float], columns: Mapping[str, Array]
+        self, values: Mapping[str, Any], columns: Mapping[str, Array], slopes: bool = True
     ) -> tuple[Array, dict[str, Array]]:
-        """Return mu_macro, and its derivatives with respect to the unknowns."""
+        """Return mu_macro, and with ``slopes`` its derivatives with respect to the ``values``."""
         inputs: dict[str, Any] = {**columns, **values, **self.kind.names}
-        answer = self.surrogate.evaluate(**inputs, gradient=True)
-        slopes = {
-            name: np.nan_to_num(answer.gradient[name], posinf=0.0, neginf=0.0)
-            for name in self.unknowns
-        }
-        return answer.mu_macro, slopes
-
-    def model_along(
-        self, name: str, x: Array, mu0: Array | None = None, slopes: bool = True
-    ) -> tuple[Array, Array]:
-        """Return mu_macro at values ``x`` (m,) of one unknown, and its derivative with respect to
-        it (zero if ``slopes`` is False): (m, n) each.  If mu0 is unknown, too, ``mu0`` (m,) has its
-        values."""
-        rows = {name: x[:, None]} | ({} if mu0 is None else {"mu0": mu0[:, None]})
-        inputs: dict[str, Any] = {**self.columns, **self.kind.names, **rows}
         answer = self.surrogate.evaluate(**inputs, gradient=slopes)
-        mu = np.asarray(answer.mu_macro)
-        return mu, np.asarray(answer.gradient[name]) if slopes else np.zeros_like(mu)
+        gradient = answer.gradient if slopes else {}
+        names = [name for name in values if name in gradient]
+        return answer.mu_macro, {
+            name: np.nan_to_num(gradient[name], posinf=0.0, neginf=0.0) for name in names
+        }
 
 
 def _friction(force: Any, load: Any) -> Any:

@@ -161,6 +161,12 @@ def test_weights_are_the_standard_deviations(surrogate: Surrogate) -> None:
     )
 
 
+def test_the_order_of_the_unknowns_does_not_matter(surrogate: Surrogate) -> None:
+    points = {"v0": V0, "mu_macro": noisy(surrogate, 1e-3, v0=V0)}
+    one, other = (fit(points, names, **RIG) for names in (("k", "mu0"), ("mu0", "k")))
+    assert one.to_dict() == other.to_dict()
+
+
 def test_the_band_covers_the_fit_and_its_slope_is_the_covariance(surrogate: Surrogate) -> None:
     estimate = fit({"v0": V0, "mu_macro": noisy(surrogate, 1e-3, v0=V0), "std": 1e-3}, **RIG)
     mu, off = estimate.predict(v0=0.05)
