@@ -458,10 +458,10 @@ def in_columns(rows: Iterable[Sequence[str]]) -> str:
     return "\n".join("  ".join(row).rstrip() for row in zip(*cells_of_rows, strict=True))
 
 
-def in_full(result: Result, *more: tuple[str, ...]) -> str:
-    """Return a result about one thing with all of its rows, ``more`` rows and its notes."""
+def in_full(result: Result, *last: tuple[str, ...]) -> str:
+    """Return a result about one thing with all of its rows, the ``last`` rows and its notes."""
     _, rows, below = result._in_full()
-    return "\n".join([in_columns([*(rows or ()), *more]), *below])
+    return "\n".join([in_columns([*(rows or ()), *last]), *below])
 
 
 def note_lines(notes: Iterable[Note]) -> list[str]:

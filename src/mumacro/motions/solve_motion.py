@@ -22,14 +22,13 @@ from mumacro.inputs.names import unknown_name
 from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.motions.motion import PARTS, motion
-from mumacro.motions.oscillation import read_oscillation
+from mumacro.motions.oscillation import MEMBERS, read_oscillation
 from mumacro.questions.search import Root, Search
 from mumacro.questions.solutions import Reach, Solution
 
 #: inputs of a motion that may be unknown
 INPUTS = ("v0", "k", "Fz", "f", "omega", "mu0")
-MEMBERS = ("amplitude", "phase")
-UNKNOWNS = (*INPUTS, *(f"{part}.{member}" for part in PARTS for member in MEMBERS))
+UNKNOWNS = (*INPUTS, *(f"{part}.{member}" for part in PARTS for member in MEMBERS[1:]))
 #: possible targets: mean forces, which have an estimate of their error
 OF = ("mu_macro", "mu_lateral")
 FIRST = 49  # number of first samples in the whole range
@@ -166,8 +165,11 @@ def _solved(curve: "MotionCurve", low: float, high: float, targets: Array) -> Mo
         curve.evaluate(np.asarray(0.5 * (low + high)))  # raises the reason
         raise InputError("within", (low, high), "a range in which the motion is possible")
     found = search.roots()
-    if curve.unknown.endswith(".phase") and high - low == 360.0:
-        found = [_without_whole_turn(of_target) for of_target in found]
+    if curve.unknown.endswith(".phase") and high - low == 360.0:  # the end is the beginning
+        found = [
+            roots[:-1] if len(roots) > 1 and roots[-1].high - 360.0 >= roots[0].low else roots
+            for roots in found
+        ]
     return MotionSolution(
         unknown=curve.unknown,
         of=curve.of,
@@ -191,12 +193,6 @@ def _places(curve: "MotionCurve", low: float, high: float) -> Array:
     return (np.geomspace if _log(low, high) else np.linspace)(low, high, FIRST)
 
 
-def _without_whole_turn(roots: list[Root]) -> list[Root]:
-    """Return each root of a phase once: 360 degrees is the same as 0."""
-    around = len(roots) > 1 and roots[-1].high - 360.0 >= roots[0].low
-    return roots[:-1] if around else roots
-
-
 # --- the curve ------------------------------------------------------------------------------------
 
 
@@ -208,22 +204,21 @@ class MotionCurve:
     def __init__(self, unknown: str, of: str, case: Mapping[str, Any]) -> None:
         self.unknown, self.of, self.case = unknown, of, dict(case)
         part, _, member = unknown.partition(".")
+        self._part, self._member = part, member
         if member:
             oscillation = read_oscillation(part, case.get(part, 0.0))
             if len(oscillation) > 1:
                 bound = f"of one harmonic where {unknown} is the unknown"
                 raise InputError(part, case[part], bound)
-            self._harmonic, self._amplitude, self._phase = oscillation[0]
-            if member == "phase" and not np.any(self._amplitude):
-                raise InputError(
-                    part, case.get(part), f"an amplitude > 0, whose {unknown} is unknown"
-                )
+            self._term = dict(zip(MEMBERS, oscillation[0], strict=True))
+            if member == "phase" and not np.any(self._term["amplitude"]):
+                bound = f"an amplitude > 0, whose {unknown} is unknown"
+                raise InputError(part, case.get(part), bound)
         elif case.get(unknown) is not None:
             raise InputError(unknown, case[unknown], "left out: it is the unknown")
         partner = {"f": "omega", "omega": "f"}.get(unknown)
         if partner and case.get(partner) is not None:
             raise InputError(partner, case[partner], f"left out: {unknown} is the unknown")
-        self._part, self._member = part, member
         for name in INPUTS:
             if case.get(name) is not None:
                 self.case[name] = self.number(name)
@@ -238,14 +233,10 @@ class MotionCurve:
     def evaluate(self, values: Array) -> tuple[Array, Array]:
         """Return the mean force and its error estimate, in the shape of the values; NaN where the
         motion does not exist."""
-        case = dict(self.case)
-        if self._member == "amplitude":
-            case[self._part] = [(self._harmonic, values, self._phase)]
-        elif self._member == "phase":
-            case[self._part] = [(self._harmonic, self._amplitude, values)]
-        else:
-            case[self.unknown] = values
-        answer = motion(**case)
+        replaced: dict[str, Any] = {self.unknown: values}
+        if self._member:
+            replaced = {self._part: {**self._term, self._member: values}}
+        answer = motion(**{**self.case, **replaced})
         mean, error = (
             np.asarray(x, float) for x in (getattr(answer, self.of), answer.error_estimate)
         )
@@ -260,13 +251,6 @@ class MotionCurve:
         if one.size != 1:
             raise InputError(name, value, "one number: a search has one motion")
         return float(one.ravel()[0])
-
-    @property
-    def omega(self) -> float:
-        """Return the angular frequency [rad/s]."""
-        if self.case.get("omega") is not None:
-            return self.number("omega")
-        return RAD_PER_CYCLE * self.number("f")
 
     def swing(self) -> float:
         """Return the largest displacement of the oscillations in x and y [m]; a harmonic counts as
@@ -314,7 +298,9 @@ def _usual_range(unknown: str, curve: MotionCurve) -> tuple[float, float]:
             raise InputError(
                 "x", curve.case.get("x"), "an oscillation in x or y, or within=(low, high)"
             )
-        return 0.0, 10.0 * swing * curve.omega
+        has_omega = curve.case.get("omega") is not None
+        omega = curve.number("omega") if has_omega else RAD_PER_CYCLE * curve.number("f")
+        return 0.0, 10.0 * swing * omega
     if member:  # an amplitude, in units of mu0 Fz / k
         length = curve.number("mu0") * curve.number("Fz") / curve.number("k")
         return 1e-3 * length, 1e3 * length
