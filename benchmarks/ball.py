@@ -24,7 +24,8 @@ from benchmarks.peers import Contender, Line, draw, grid_axis, on_grid, plot
 from builder.solver.ball import Ball, Springs
 from mumacro import Surrogate
 from mumacro.table.atlas import MIDDLE
-from tests.support.measuring import IMAGES, ROOT, best_of, main, markdown, progress, quantity
+from tests.support.measuring import IMAGES, best_of, main, markdown, progress, quantity
+from tests.support.places import ROOT
 
 Array = NDArray[np.float64]
 FULL_GRIDS, QUICK_GRIDS = (64, 128, 256), (16, 24)

@@ -5,7 +5,8 @@
 Points are spread evenly in ln v~ and ln y~ over 1e-3 to 1e3, in random order.
 """
 
-from tests.support.measuring import ROOT, best_of, main, markdown, progress, quantity
+from tests.support.measuring import best_of, main, markdown, progress, quantity
+from tests.support.places import ROOT
 
 # isort: split
 

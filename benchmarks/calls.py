@@ -1,7 +1,7 @@
 """Time of one call, a point of large arrays, and a new process; beside scipy's elliptic integral
 and numpy."""
 
-from tests.support.measuring import ROOT, best_of, main, markdown, quantity  # isort: split
+from tests.support.measuring import best_of, main, markdown, quantity  # isort: split
 
 import statistics
 import subprocess
@@ -17,6 +17,7 @@ from scipy.special import ellipk
 
 import mumacro
 from mumacro.outputs import OUTPUTS
+from tests.support.places import ROOT
 from tests.support.serving import CASE
 
 SCALARS = {

@@ -8,7 +8,7 @@ results: spring and ball, across and along, one and two unknowns, 4 to 12 points
 deviations given and not given.
 """
 
-from tests.support.measuring import ROOT, main, markdown, sections  # isort: split
+from tests.support.measuring import main, markdown, sections  # isort: split
 
 import hashlib
 import json
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from mumacro import InputError, Surrogate, fit
 from tests.support.fits import least_chi2, random_points
+from tests.support.places import ROOT
 
 Array = NDArray[np.float64]
 CACHE = ROOT / "build" / "fit_coverage"

@@ -9,7 +9,7 @@ is the force without shaking over the weight.  Forces do not depend on the weigh
 count alone.
 """
 
-from tests.support.measuring import IMAGES, ROOT, main, markdown, sections  # isort: split
+from tests.support.measuring import IMAGES, main, markdown, sections  # isort: split
 
 import csv
 import warnings
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from mumacro import Fit, Surrogate, fit, solve_for
 from mumacro.plotting import BLUE, GREY, INK, RED, head, save
+from tests.support.places import ROOT
 
 Array = NDArray[np.float64]
 DATA = ROOT / "tests" / "data"

@@ -23,7 +23,8 @@ import numpy as np
 from mumacro import Surrogate
 from mumacro.kernel.arrays import Array
 from mumacro.table.blocks import Table
-from tests.support.measuring import ROOT, machine, main, markdown, progress, quantity
+from tests.support.measuring import machine, main, markdown, progress, quantity
+from tests.support.places import ROOT
 
 HEADER = (
     "table",

@@ -6,7 +6,7 @@ A deviation is formula/exact - 1 unless the section states otherwise; exact is t
 1e-12 table where thousands of points are needed.
 """
 
-from tests.support.measuring import FINEST, ROOT, main, markdown, quantity, sections  # isort: split
+from tests.support.measuring import FINEST, main, markdown, quantity, sections  # isort: split
 
 import csv
 import math
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from benchmarks.solver import march
 from builder.solver.steady import border, solve
 from mumacro import Surrogate, closed_forms
+from tests.support.places import ROOT
 
 Array = NDArray[np.float64]
 Formula = Callable[[Array], Array]

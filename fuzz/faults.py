@@ -18,7 +18,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mumacro import Surrogate
-from tests.support.measuring import ROOT, main, markdown, sections
+from tests.support.measuring import main, markdown, sections
+from tests.support.places import ROOT
 
 SMALLEST = ROOT / "tables" / "mumacro-1e-4.nc"
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}

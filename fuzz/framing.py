@@ -16,7 +16,8 @@ from functools import cache
 
 import h11
 
-from tests.support.measuring import ROOT, main, markdown, sections
+from tests.support.measuring import main, markdown, sections
+from tests.support.places import ROOT
 from tests.support.serving import CASE, Server, chunk, connect, serving, to_end
 
 TABLE, TOTAL = ROOT / "tables" / "mumacro-1e-4.nc", 200_000

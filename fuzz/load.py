@@ -19,7 +19,8 @@ from urllib.parse import urlencode
 
 import numpy as np
 
-from tests.support.measuring import ROOT, main, markdown, sections
+from tests.support.measuring import main, markdown, sections
+from tests.support.places import ROOT
 from tests.support.serving import CASE, Server, asking, serving
 
 BATCH = "/v1/mu-macro/batch"

@@ -23,7 +23,8 @@ import orjson
 
 from mumacro.outputs import OUTPUTS
 from mumacro.stiffness import AXES, GEOMETRIES
-from tests.support.measuring import ROOT, main, markdown, progress, sections
+from tests.support.measuring import main, markdown, progress, sections
+from tests.support.places import ROOT
 from tests.support.serving import CASE, Server, serving
 
 TABLE = ROOT / "tables" / "mumacro-1e-4.nc"

@@ -31,7 +31,8 @@ from mumacro.table.atlas import BORDER_PIECES
 from mumacro.table.blocks import Table
 from mumacro.table.netcdf import parse_table, read_table, write_table
 from mumacro.table.polynomials import nodes
-from tests.support.measuring import ROOT, main, markdown, sections
+from tests.support.measuring import main, markdown, sections
+from tests.support.places import ROOT
 
 SMALLEST = ROOT / "tables" / "mumacro-1e-4.nc"
 STEP = 256  # bytes between truncations

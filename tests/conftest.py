@@ -19,12 +19,14 @@ from mumacro import Surrogate
 from tests.support import browser as browsing
 from tests.support import serving as servers
 from tests.support.cases import CASE, Array, Case
+from tests.support.nightly import COLLECTED
 from tests.support.serving import Server
 
 if TYPE_CHECKING:  # tests of the library need neither the service nor its dependencies
     from starlette.testclient import TestClient
 
-REPOSITORY = Path(__file__).resolve().parent.parent
+TESTS = Path(__file__).resolve().parent
+REPOSITORY = TESTS.parent
 
 
 @pytest.fixture(scope="session")
@@ -197,11 +199,15 @@ LONGEST = (
 
 
 @pytest.hookimpl(tryfirst=True)  # before the expression of -m is applied
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """A test with such a fixture is marked peer; the longest files come first."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """A test with such a fixture is marked peer; nightly ones are told apart; the longest files
+    come first."""
+    collected = config.stash[COLLECTED] = {False: set(), True: set()}
     for item in items:
         if PEERS & {*getattr(item, "fixturenames", ())}:
             item.add_marker("peer")
+        file, function = item.path.relative_to(TESTS).as_posix(), getattr(item, "originalname", "")
+        collected[item.get_closest_marker("nightly") is not None].add((file, function))
     place = {name: i for i, name in enumerate(LONGEST)}
     items.sort(key=lambda item: place.get(item.path.name, len(place)))
 

@@ -41,12 +41,19 @@ posix = pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")
 BARE = {"README", "tutorial"}
 NUMBER = re.compile(r"-?\d+\.?\d*(?:e[-+]?\d+)?")
 SERVICE = "http://127.0.0.1:8000"
-SESSION = """
-import doctest, sys
-name = sys.argv[1]
-test = doctest.DocTestParser().get_doctest(open(name, encoding="utf-8").read(), {}, name, name, 0)
-result = doctest.DocTestRunner(verbose=False).run(test)
-sys.exit(0 if result.attempted and not result.failed else 1)
+#: the sessions of all pages in one process, so that packages are imported once: each is a
+#: folder and a file, and the program names those that fail
+SESSIONS = """
+import doctest, os, sys
+failed = []
+for folder, file in zip(sys.argv[1::2], sys.argv[2::2]):
+    os.chdir(folder)
+    text = open(file, encoding="utf-8").read()
+    test = doctest.DocTestParser().get_doctest(text, {}, file, file, 0)
+    result = doctest.DocTestRunner(verbose=False).run(test)
+    if result.failed or not result.attempted:
+        failed.append(file)
+sys.exit(", ".join(failed) or 0)
 """
 #: these make the environments
 INSTALLS = {"bare": "pip install .", "service": 'pip install ".[service]"'}
@@ -383,15 +390,19 @@ def reader(tmp_path: Path) -> Path:
 
 @posix
 @pytest.mark.slow
-@pytest.mark.parametrize("page", having("pycon"), ids=name)
-def test_python_sessions(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    bare = page.stem in BARE
-    programs = request.getfixturevalue("bare" if bare else "full")
-    # a newcomer is still in the folder from which it was installed
-    folder = request.getfixturevalue("clone") if bare else tmp_path
-    session = "\n".join(block.text for block in blocks(page, "pycon") if not block.marked)
-    (tmp_path / "session.txt").write_text(session, "utf-8")
-    run(programs, folder, programs / "python", "-c", SESSION, tmp_path / "session.txt")
+@pytest.mark.parametrize("where", ["bare", "full"])
+def test_python_sessions(where: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    programs, words = request.getfixturevalue(where), list[Path]()
+    for page in having("pycon"):
+        if (page.stem in BARE) == (where == "bare"):
+            file = tmp_path / name(page).replace("/", "-") / "session.txt"
+            file.parent.mkdir()
+            session = "\n".join(block.text for block in blocks(page, "pycon") if not block.marked)
+            file.write_text(session, "utf-8")
+            # a newcomer is still in the folder from which it was installed
+            words += [request.getfixturevalue("clone") if where == "bare" else file.parent, file]
+    assert words
+    run(programs, tmp_path, programs / "python", "-c", SESSIONS, *words)
 
 
 def number_parts(text: str) -> tuple[list[str], list[str]]:

@@ -1,11 +1,9 @@
 """What only the nightly run has, so that nothing slips into it unseen: longer forms of tests that
 every run has."""
 
-import subprocess
-import sys
-
 import pytest
 
+from tests.support.nightly import COLLECTED
 from tests.support.places import ROOT
 
 #: the functions with a longer form, by their files
@@ -30,23 +28,12 @@ NIGHTLY = {
 }
 
 
-def collected(marks: str) -> dict[str, set[str]]:
-    """The functions of all tests with these marks, by their files."""
-    command = [sys.executable, "-m", "pytest", "-n", "0", "--collect-only", "-m", marks]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    functions: dict[str, set[str]] = {}
-    for line in done.stdout.splitlines():
-        if line.startswith("tests/") and "::" in line:
-            file, function = line.partition("[")[0].split("::")
-            functions.setdefault(file.removeprefix("tests/"), set()).add(function)
-    return functions
-
-
-@pytest.mark.slow
-def test_the_nightly_tests_are_those_listed_and_each_has_a_form_that_every_run_has() -> None:
-    assert collected("nightly") == NIGHTLY
-    ordinary = collected("not nightly")
-    assert {file: functions - ordinary[file] for file, functions in NIGHTLY.items()} == {
-        file: set() for file in NIGHTLY
-    }
+def test_the_nightly_tests_are_those_listed_and_each_has_a_form_that_every_run_has(
+    pytestconfig: pytest.Config,
+) -> None:
+    ordinary, nightly = (pytestconfig.stash[COLLECTED][marked] for marked in (False, True))
+    files = {file for file, _ in ordinary}
+    listed = {(file, function) for file, of_it in NIGHTLY.items() for function in of_it}
+    assert nightly == {one for one in listed if one[0] in files}
+    assert nightly <= ordinary
+    assert all((ROOT / "tests" / file).is_file() for file in NIGHTLY)

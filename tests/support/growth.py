@@ -5,6 +5,7 @@ and writes one line for each repetition before it is tried, and one with what wa
 Run it in a process of its own with a limit on its time: nothing can interrupt a match.
 """
 
+import heapq
 import json
 import re
 import sys
@@ -12,14 +13,17 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
 from itertools import product
+from operator import itemgetter
 from re import _parser  # type: ignore[attr-defined]
 from typing import Any, NamedTuple
 
 SHORT, LONG = 4 * 1024, 64 * 1024  # characters
 #: the largest ratio of the times of a long and a short text: 16 if linear, 256 if quadratic
 MOST = 64.0
-#: characters, while the worst text is looked for: the first find what is cubic or has no end
-_LOOK = (250, 2000)
+#: characters, while the worst text is looked for: the first find what is cubic or has no end, and
+#: which texts are slow enough to be tried longer
+_LOOK, _LONGER, _TRIED_LONGER = 250, 2000, 30
+_LASTING = 0.05  # seconds: one run tells them well enough
 _TOO_LONG = 3000.0  # times as long as an expression that takes each character once
 _CHARACTERS = "\t\n !\"%'()*,-./019:;<=>@AZ[\\]_az{}~\0é–µ"
 _CATEGORIES = {
@@ -156,12 +160,14 @@ def _pumped(start: str, pump: str, end: str, size: int) -> str:
 
 
 def _best(run: Callable[[Any], object], text: Any, times: int) -> float:
-    """The shortest time of several runs [s]."""
+    """The shortest time of several runs [s]; of a long one the first."""
     best = float("inf")
     for _ in range(times):
         begun = _clock()
         run(text)
         best = min(best, _clock() - begun)
+        if best > _LASTING:
+            break
     return best
 
 
@@ -205,17 +211,27 @@ def growth(pattern: str | bytes, flags: int, method: str) -> Iterator[tuple[str,
         text = make(size)
         return _best(run, text if isinstance(pattern, str) else text.encode(), times)
 
+    def too_long(make: Callable[[int], str], size: int, taken: float) -> bool:
+        limit = _TOO_LONG * _once(size)
+        return taken > limit and seconds(make, 5, size) > limit
+
+    def worst(repetition: Repetition) -> tuple[Callable[[int], str], float | None]:
+        """The slowest text, and its ratio where that is known already."""
+        looked = list[tuple[float, Callable[[int], str]]]()
+        for make in _texts(repetition, characters):
+            looked.append((seconds(make, 2, _LOOK), make))
+            if too_long(make, _LOOK, looked[-1][0]):
+                return make, float("inf")
+        tried = list[tuple[float, Callable[[int], str]]]()
+        for _, make in heapq.nlargest(_TRIED_LONGER, looked, key=itemgetter(0)):
+            tried.append((seconds(make, 2, _LONGER), make))
+            if too_long(make, _LONGER, tried[-1][0]):
+                return make, float("inf")
+        return max(tried, key=itemgetter(0))[1], None
+
     for repetition in _repetitions(tree, characters):
-        slowest, ratio = 0.0, None
-        worst: Callable[[int], str] = str
-        for size, make in product(_LOOK, _texts(repetition, characters)):
-            limit = _TOO_LONG * _once(size)
-            if seconds(make, 2, size) > limit and seconds(make, 5, size) > limit:
-                worst, ratio = make, float("inf")
-                break
-            if size == _LOOK[-1] and (taken := seconds(make, 2, size)) > slowest:
-                slowest, worst = taken, make
-        yield repr(worst(8)), _ratio(partial(seconds, worst, 5)) if ratio is None else ratio
+        make, ratio = worst(repetition)
+        yield repr(make(8)), _ratio(partial(seconds, make, 5)) if ratio is None else ratio
 
 
 def main() -> None:

@@ -15,6 +15,7 @@ from pathlib import Path
 from time import perf_counter, process_time
 
 from tests.support.documents import PAGES
+from tests.support.places import ROOT
 
 for _name in (
     "OMP_NUM_THREADS",
@@ -24,7 +25,6 @@ for _name in (
 ):
     os.environ[_name] = "1"
 
-ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "build" / "results"
 IMAGES = ROOT / "docs" / "img"
 PACKAGES = ("numpy", "scipy", "numba", "h5py", "pyarrow", "dask", "xarray", "uvicorn")

@@ -8,6 +8,9 @@ from typing import Any
 
 import pytest
 
+#: file and function of the tests that this run has found, of ordinary and of nightly ones
+COLLECTED = pytest.StashKey[dict[bool, set[tuple[str, str]]]]()
+
 
 def nightly(*values: Any) -> Any:
     """Return a set of parameters that only the nightly run has."""
