@@ -60,6 +60,7 @@ def start(folder: Path) -> Any:
         "disable-background-networking",
         "disable-component-update",
         "disable-sync",
+        "disable-back-forward-cache",  # a page that is left would be kept, in a process of its own
         "window-size=1400,1000",
         "hide-scrollbars",
         "host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
