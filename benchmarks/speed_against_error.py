@@ -12,7 +12,6 @@ processor time of one thread, best of interleaved rounds; errors are against fre
 from tests.support.measuring import (  # isort: split
     FINEST,
     IMAGES,
-    ROOT,
     best_of,
     main,
     markdown,
@@ -68,6 +67,7 @@ from mumacro.table.atlas import QUANTITY_NAMES
 from mumacro.table.blocks import Table, TabulatedContact
 from mumacro.table.netcdf import write_table
 from mumacro.table.polynomials import Border
+from tests.support.places import ROOT
 from tests.support.serving import CASE, serving
 
 FULL_GRIDS, QUICK_GRIDS = (64, 256, 1024), (24, 48)

@@ -202,7 +202,8 @@ LONGEST = (
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """A test with such a fixture is marked peer; nightly ones are told apart; the longest files
     come first."""
-    collected = config.stash[COLLECTED] = {False: set(), True: set()}
+    collected: dict[bool, set[tuple[str, str]]] = {False: set(), True: set()}
+    config.stash[COLLECTED] = collected
     for item in items:
         if PEERS & {*getattr(item, "fixturenames", ())}:
             item.add_marker("peer")

@@ -24,7 +24,8 @@ import pytest
 from mumacro import Surrogate
 from service.observe import LogLines, for_people
 from tests.support.cases import Case
-from tests.support.serving import CASE, ROOT, connect, head, to_end
+from tests.support.places import ROOT
+from tests.support.serving import CASE, connect, head, to_end
 
 SINGLE, BATCH = "/v1/mu-macro", "/v1/mu-macro/batch"
 #: texts that a client behind a proxy can send in place of its address
