@@ -72,7 +72,7 @@ ELSEWHERE = {
     "docker build -t mumacro .": ("deploy/container.sh", '"$engine" build'),
     "python -m builder build --tolerance 1e-8 --out my-table.nc": (
         "tests/builder/test_builder_cli.py",
-        'here("build", "--tolerance", "1e-2", "--out", out',
+        'here("build", "--tolerance", "1e-4", "--out", out',
     ),
     "python -m builder verify my-table.nc --points 20000": (
         "tests/builder/test_builder_cli.py",

@@ -14,7 +14,6 @@ import xarray as xr
 
 from builder.solver.steady import solve
 from builder.solver.sweep import Sweep
-from builder.tables.build import build_table
 from builder.tables.contacts import spring
 from builder.tables.draws import SEAMS
 from builder.tables.quantities import ABS_TO_REL, STICK_NOISE, solver_noise
@@ -284,24 +283,3 @@ def test_the_plain_grid_is_solved_and_reads_like_the_surface(path: Path, sweep: 
         np.testing.assert_allclose(
             stick[::7, ::7], solved["stick_fraction"], rtol=tolerance / STEPS, atol=1e-9
         )
-
-
-@pytest.mark.slow
-def test_the_smallest_table_is_what_the_builder_makes(
-    tmp_path: Path, sweep: Sweep, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # fresh solves of the committed table are compared above
-    monkeypatch.setattr("builder.tables.build.FINAL_POINTS", 500)
-    again = build_table(tmp_path / "again.nc", 1e-4, sweep)
-    for contact, entry in read_table(PATHS[0]).contacts.items():
-        for old, new in zip(entry.blocks, again.table.contacts[contact].blocks, strict=True):
-            assert old.cells == new.cells
-            # the last digits depend on the processor's instructions
-            for name in old.nodes:
-                np.testing.assert_allclose(new.nodes[name], old.nodes[name], rtol=1e-12, atol=1e-14)
-                if contact == "spring":
-                    # of the differences between cells and model: 3 binary digits, rounded up.  Of
-                    # a ball a derivative may hang on which coefficients count as rounding
-                    np.testing.assert_allclose(
-                        new.cell_errors[name], old.cell_errors[name], rtol=0.26
-                    )
