@@ -250,6 +250,7 @@ def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] |
     shows_signs = "." in text or ('"' if sep == "," else ",") in text
     if (
         table.layout.sep == BLANKS
+        or not table.layout.inputs
         or table.open_row
         or account.name in text
         or (shows_signs and not table.signs.decimal)

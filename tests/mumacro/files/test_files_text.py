@@ -300,6 +300,45 @@ def test_a_column_that_is_missing_is_told_before_what_is_wrong_with_a_row(tmp_pa
         evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
 
 
+def test_a_table_of_words_alone_is_told_which_columns_are_missing(tmp_path: Path) -> None:
+    (tmp_path / "cases.csv").write_text("contact,note\nball,1\n")
+    with pytest.raises(FilesError, match="line 1: there are no columns mu0"):
+        evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(
+                ["r1", '"a, b"', '"a ""b"""', '"two\nlines"', "#1", "mean 1", '5"', ""]
+            ),
+            st.sampled_from(["0.3", "", "-", "nan", "0.4", "1e-1", "x", " 0.2"]),
+            st.sampled_from(["1e6", "rigid", "inf", "1e999", "2.5E6", ""]),
+            st.sampled_from(["ok", "std", '"q"', "", "# no comment"]),
+        ),
+        min_size=1,
+        max_size=12,
+    )
+)
+def test_rows_read_at_once_are_those_read_one_by_one(
+    tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[str, str, str, str]]
+) -> None:
+    lines = [f"{name},{mu0},10,{k},2e-6,20000,0.01,{note}" for name, mu0, k, note in rows]
+    folder, head = tmp_path_factory.mktemp("rows"), f"name,{HEAD},note"
+    read = []
+    for comment in ("", "# a comment, for which all lines are looked at\n"):
+        path = folder / "cases.csv"
+        path.write_text("\n".join([head, *lines, comment]))
+        try:
+            summary = evaluate_files([path], folder / "out.csv", TABLE, force=True)
+            rejects = summary.rejects.read_text() if summary.rejects else ""
+            read.append(((folder / "out.csv").read_text(), rejects))
+        except FilesError as error:
+            read.append((str(error), ""))
+    assert read[0] == read[1]
+
+
 def test_the_decimal_sign_may_show_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(decoding, "PIECE", 100)
     row = "1;10;1000000;1;20000;1\n"
