@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from mumacro import plotting
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError, open_table
-from mumacro.cli.table_format import add_format, dialect_in, fit_to, read_file
+from mumacro.cli.table_format import add_format, dialect_in, fit_to, read_file, say_how_read
 from mumacro.fits.fit import fit
 from mumacro.fits.fitted import Fit
 from mumacro.fits.measured_points import STD, UNKNOWNS, read_points, unknowns_beside
@@ -68,11 +68,13 @@ def run(words: Sequence[str]) -> str:
             warnings.simplefilter("ignore")  # they are in the result
             return fit(table.columns, unknown, **kind.names, surrogate=surrogate, **case.inputs)
 
-    result = fit_to("fit", options.points, table, fitted, {})
+    result = fit_to(options.points, table, fitted, {})
     columns = {
         name if name in ("mu_macro", STD) else f"{name} [{unit_of(name)}]": column
         for name, column in result.points.items()
     }
     columns |= {"mu_macro fitted": result.points["mu_macro"] - result.residuals}
     text = common.in_full(result)
-    return common.present(options, result, columns, text, surrogate, **plotting.OF_FIT)
+    output = common.present(options, result, columns, text, surrogate, **plotting.OF_FIT)
+    say_how_read("fit", table)
+    return output

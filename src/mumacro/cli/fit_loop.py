@@ -8,7 +8,7 @@ from functools import partial
 from mumacro import plotting
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError
-from mumacro.cli.table_format import add_format, dialect_in, fit_to, read_file
+from mumacro.cli.table_format import add_format, dialect_in, fit_to, read_file, say_how_read
 from mumacro.errors import InputError
 from mumacro.fits.loop import fit_loop
 from mumacro.inputs.account import ColumnNames
@@ -71,12 +71,14 @@ def run(words: Sequence[str]) -> str:
     table = read_file(options.loop, lambda source: read_numbers(source, column_names, dialect))
     columns = {what: table.columns[name] for what, name in names.items()} | load
     fit = partial(fit_loop, **columns, contact=options.contact, cycles=options.cycles)
-    found = fit_to("fit-loop", options.loop, table, fit, names)
+    found = fit_to(options.loop, table, fit, names)
     heads = ("displacement [m]", "force [N]", "Fz [N]", "force fitted [N]")
     in_si = dict(zip(heads, found.loop.values(), strict=True))
     samples = ("samples", str(found.residuals.size), "", f"{found.contact}, {found.cycles} cycles")
     text = common.in_full(found, samples)
-    return common.present(options, found, in_si, text, **plotting.OF_FIT)
+    output = common.present(options, found, in_si, text, **plotting.OF_FIT)
+    say_how_read("fit-loop", table)
+    return output
 
 
 def _load(words: Sequence[str], column: str | None) -> dict[str, float]:

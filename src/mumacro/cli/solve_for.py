@@ -118,13 +118,14 @@ def run(words: Sequence[str]) -> str:
     table = _table(unknown, rows, unit, k_unit, solution.digits)
     notes = common.note_lines(solution.notes)
     text = "\n".join([common.case_line(case, kind), table, *ranges, *without, *notes])
-    heads = ("k [N/m]", f"{unknown} [{solution.unit}]", *_HEADS)
-    columns = dict(zip(heads, zip(*((k, *root) for k, root in rows), strict=True), strict=True))
-    if not solution.ends:
-        del columns["k [N/m]"]
-    return common.present(
-        options, solution, columns, text if options.out is None else "", surrogate
+    heads = (f"{unknown} [{solution.unit}]", *_HEADS)
+    columns: dict[str, Sequence[Any]] = dict(
+        zip(heads, zip(*(root for _, root in rows), strict=True), strict=True)
     )
+    if solution.ends:
+        columns = {"k [N/m]": [k for k, _ in rows], **columns}
+    text = text if options.out is None else ""
+    return common.present(options, solution, columns, text, surrogate)
 
 
 def _table(

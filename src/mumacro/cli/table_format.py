@@ -63,20 +63,23 @@ def read_file(name: str, read: Callable[[Path | bytes], TableOfNumbers]) -> Tabl
 
 
 def fit_to(
-    command: str, name: str, table: TableOfNumbers, fit: Callable[[], Any], heads: Mapping[str, str]
+    name: str, table: TableOfNumbers, fit: Callable[[], Any], heads: Mapping[str, str]
 ) -> Any:
-    """Return the fit to a table, and say on stderr how the table was read.
+    """Return the fit to a table.
 
     A refusal of a value names its line, and its column, whose header ``heads`` may have.
     """
     try:
-        result = fit()
+        return fit()
     except InputError as error:
         at_line = f"line {table.lines[error.index]}: " if error.index is not None else ""
         fault = InputError(heads.get(error.field, error.field), error.value, error.bound)
         raise ImpossibleError(f"{name}: {at_line}{fault}") from None
     except ModuleNotFoundError as error:  # it says what to install
         raise ImpossibleError(str(error)) from None
+
+
+def say_how_read(command: str, table: TableOfNumbers) -> None:
+    """Say on stderr how a table was read."""
     if table.read_as:
         print(f"mumacro {command}: read as: {table.read_as}", file=sys.stderr)
-    return result

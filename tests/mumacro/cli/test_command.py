@@ -623,6 +623,26 @@ def test_results_go_into_pictures_and_csv(
     assert b"<dc:date>" not in (tmp_path / "out.svg").read_bytes()
 
 
+@pytest.mark.parametrize(
+    ("unknown", "k", "heads"),
+    [
+        ("k", "", "k [N/m],between,and,mu_macro [-],regime"),
+        ("y0", "k=1N/um", "y0 [m],between,and,mu_macro [-],regime"),
+        ("y0", "k=0.8..1.2N/um", "k [N/m],y0 [m],between,and,mu_macro [-],regime"),
+    ],
+)
+def test_roots_go_into_csv_with_their_stiffness_where_it_has_an_interval(
+    capsys: Capture, tmp_path: Path, unknown: str, k: str, heads: str
+) -> None:
+    case = f"mu0=0.3 Fz=10N f=20kHz v0=10mm/s {k}" + (" y0=2um" if unknown == "k" else "")
+    out = tmp_path / "roots.csv"
+    output_of(capsys, 0, "solve-for", unknown, case, "--target", "0.2", "-o", str(out))
+    head, *rows = out.read_text().splitlines()
+    assert head == heads
+    assert len(rows) == (3 if ".." in k else 1)
+    assert {row.count(",") for row in rows} == {head.count(",")}
+
+
 def test_a_picture_names_the_extra_it_needs(
     capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
