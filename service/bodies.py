@@ -127,7 +127,9 @@ async def read_body(
             ticket.weigh(size)
             ticket.hold(len(body))
         if not unfinished:
-            return body.removeprefix(_BYTE_ORDER_MARK)  # RFC 8259, 8.1
+            if body.startswith(_BYTE_ORDER_MARK):  # RFC 8259, 8.1
+                del body[: len(_BYTE_ORDER_MARK)]
+            return body
         message = await receive()
         if message["type"] != "http.request":
             raise ClientDisconnect

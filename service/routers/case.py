@@ -41,7 +41,8 @@ async def _answered(request: Request, case: CaseRequest) -> dict[str, Any]:
     state, inputs = request.app.state, case.inputs
     table = state.tables.pick(case.tolerance)
     members: dict[str, Any] = {}
-    if case.include and UNDERSTOOD in case.include:
+    wanted = case.include or ()
+    if UNDERSTOOD in wanted:
         members = {UNDERSTOOD: understood(case.model_dump(warnings=False))}
     try:
         if case.model_fields_set <= _PLAIN and "k_low" not in inputs:
@@ -52,7 +53,7 @@ async def _answered(request: Request, case: CaseRequest) -> dict[str, Any]:
             work = partial(table.surrogate.answer, cases, outputs)
             large = cost(outputs, cases) > _LARGE
             answer = await compute(request, work) if large else work()
-        if case.model:
+        if MODEL in wanted:
             work = partial(_of_model, answer)
             members |= await compute(request, work)
     except InputError as error:  # the same as with_members, without the call of a function

@@ -205,7 +205,7 @@ def test_settling_is_the_librarys(client: Any, case: Case, surrogate: Surrogate)
         assert (answer["settling"]["time"] is None) == (at["v0"] == 0)  # it never slips
 
 
-def test_an_endpoint_answers_a_case_by_six_functions(client: Any, case: Case) -> None:
+def test_an_endpoint_answers_a_case_by_five_functions(client: Any, case: Case) -> None:
     """What a reader follows from the endpoint to its answer, beside the library's own functions."""
     text = json.dumps(case).encode()
     scope = {
@@ -247,4 +247,4 @@ def test_an_endpoint_answers_a_case_by_six_functions(client: Any, case: Case) ->
 
     asyncio.run(answered())
     assert statuses[0] == 200
-    assert len(called - {"post_mu_macro"}) == 6, sorted(called)
+    assert len(called - {"post_mu_macro"}) == 5, sorted(called)
