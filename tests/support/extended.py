@@ -9,6 +9,7 @@ Arrays broadcast; rows come in the order of :data:`ROWS`.
 """
 
 import math
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -72,6 +73,12 @@ class Turning:
         self.b = np.where(self.x < 0.5, np.arcsin(self.x), 0.5 * PI - self.c)
         self.travel = 2.0 * Arc(self.c).bent
 
+    def of(self, chosen: Any) -> "Turning":
+        """Those with these numbers."""
+        some = copy(self)
+        vars(some).update({name: x[chosen] for name, x in vars(self).items()})
+        return some
+
 
 def half_stick(at: Turning) -> tuple[Any, Any]:
     """h and pi - h of a spring that does not slip backwards, by bisection in the logarithm of the
@@ -121,20 +128,20 @@ def of_reverse(at: Turning, m: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
 
 def reverse_root(at: Turning, a: Any) -> Any:
     """m with F(m) = 2/a by safeguarded Newton steps."""
-    low, high = np.zeros_like(at.x), np.full(at.x.shape, PI)
     m = 2.0 * np.arcsin(np.minimum(1.0 / np.sqrt(a), 1.0))
+    low, high, going = np.zeros_like(m), np.full(m.shape, PI), np.arange(m.size)
     for _ in range(100):
-        _, _, rest, slope, legal, inside = of_reverse(at, m)
-        off = np.where(legal, rest - 2.0 / a, np.inf)
+        before, below, beyond = m[going], low[going], high[going]
+        _, _, rest, slope, legal, inside = of_reverse(at.of(going), before)
+        off = np.where(legal, rest - 2.0 / a[going], np.inf)
         slope = np.where(legal & inside, slope, np.where(legal, 0.0, np.nan))
         upper = (off > 0.0) | ~(slope > 0.0)
-        high, low = np.where(upper, m, high), np.where(upper, low, m)
-        after = m - off / slope
-        after = np.where((after >= low) & (after <= high), after, 0.5 * (low + high))
-        done = np.abs(after - m) <= 1e-19 * m
-        m = after
-        if done.all():
-            break
+        beyond, below = np.where(upper, before, beyond), np.where(upper, below, before)
+        after = before - off / slope
+        after = np.where((after >= below) & (after <= beyond), after, 0.5 * (below + beyond))
+        m[going], low[going], high[going] = after, below, beyond
+        # a point that has ended costs nothing any more
+        going = going[np.abs(after - before) > 1e-19 * before]
     return m
 
 
@@ -215,12 +222,13 @@ def ball(v: Any, y: Any, nodes: int = 64, panels: int = 0) -> Any:
         lack = y * deficit(h, rest_of_pi) * still
         along_v = v * h * h / PI * still
         out = np.array([carried - lack, 0.0 * v, carried * h / PI, along_v, -(lack + along_v)])
-        for beyond, weight in shares(nodes, panels):
-            rest = edge * beyond
-            s = np.maximum(rest * (2.0 - rest), np.maximum(np.maximum(v, y), 1.0) / Long(1e300))
-            share = Long(1.5) * s * edge * weight
-            a = y / (Long(1.5) * s)
-            out += share * np.where(edge > 0.0, reversing(at, v / (Long(1.5) * s), a), 0.0)
+        beyond, weight = shares(nodes, panels).T[:, :, None]
+        rest = edge * beyond  # of every node and point
+        s = np.maximum(rest * (2.0 - rest), np.maximum(np.maximum(v, y), 1.0) / Long(1e300))
+        share = Long(1.5) * s * edge * weight
+        every = at.of(np.tile(np.arange(v.size), len(s)))
+        rows = reversing(every, (v / (Long(1.5) * s)).ravel(), (y / (Long(1.5) * s)).ravel())
+        out += np.where(edge > 0.0, share * rows.reshape(5, *s.shape), 0.0).sum(axis=1)
         out[0] = np.clip(out[0], 0.0, 1.0)
         # 3/2 int s (y~ D/y~ - 3 s) / pi over the springs that slip backwards
         of_load, of_square = edge**2 - edge**3 / 3.0, 4.0 * edge**3 / 3.0 - edge**4 + edge**5 / 5.0
