@@ -1,12 +1,13 @@
 """Shared by the tests: the committed tables, a service with its client, reference values, solvers,
 the builder."""
 
+import gc
 import os
 import re
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -196,6 +197,17 @@ LONGEST = (
     "test_benchmarks.py",
     "test_files_run.py",
 )
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, Any, Any]:
+    """Thousands of tests and all modules are found, and stay: nothing of them is looked through for
+    garbage, now or between the tests."""
+    gc.disable()
+    found = yield
+    gc.freeze()
+    gc.enable()
+    return found
 
 
 @pytest.hookimpl(tryfirst=True)  # before the expression of -m is applied
