@@ -304,7 +304,7 @@ def fits(page: Any, width: int) -> None:
 #: the texts that are not seen whole: their own box, or one around it that hides or scrolls, is
 #: smaller than they are
 CUT = """
-const unseen = '.unseen, option, script, style, svg, .choice input';
+const unseen = 'option, script, style, svg, .choice input';
 const cut = (box, text) => text.bottom > box.bottom + 1 || text.right > box.right + 1 ||
   text.top < box.top - 1 || text.left < box.left - 1;
 const found = [];

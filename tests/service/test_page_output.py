@@ -772,12 +772,31 @@ def test_the_number_of_any_motion_is_the_large_one(open_page: Any) -> None:
     assert page.number("#motion-mu") == 0.2405
     assert page.text("#motion-share") == "80 % of µ₀ is left"
     page.type("#motion-y", "wet")
-    assert page.text("#motion-status") == "Check y."
+    assert page.text("#motion-status") == "Check y. The number shown is that of y = 2 um."
     assert page.is_old("#motion-number")
     page.click("[name=direction][value=along]")
     assert page.find("#field-y0").is_displayed()
     assert page.find("#mu").is_displayed()
     assert not page.find("#motion-mu").is_displayed()
+
+
+@pytest.mark.parametrize(
+    ("address", "case"),
+    [("y=wet", "y = none"), ("Fz=5 apples", "Fz = 10 N"), ("x=5 apples", "x = 2 µm @ 90 deg")],
+)
+def test_a_link_to_a_motion_that_is_refused_shows_another_one(
+    open_page: Any, address: str, case: str
+) -> None:
+    page = open_page(f"#motion=any&{address}", width=1280, height=800)
+    name = address.partition("=")[0]
+    told = f"Check {name}. The number shown is that of {case}."
+    assert page.text("#motion-status") == told
+    assert page.number("#motion-mu") == -0.02776
+    assert page.is_old("#motion-number")
+    assert len(page.texts("#forces.old .curve")) == 3
+    note = page.text(".field.bad .note")
+    assert note
+    assert page.run("return document.body.innerText;").count(note) == 1
 
 
 def test_the_motion_at_the_start_answers_its_question(open_page: Any) -> None:

@@ -22,6 +22,7 @@ import {
   prefixed,
   prose,
   show,
+  whole,
 } from "./words.js";
 
 const { extent } = d3;
@@ -72,20 +73,28 @@ export function motionPanel(store, moved, copy) {
     const left = unknown.includes(".") ? [] : [unknown];
     return { ...motionOf(store.state, answer, left), unknown, target };
   }
-  const motions = new Channel(
-    (body) => post("v1/motion", body),
-    (reply, body) => {
-      [motion, asked] = [reply, JSON.stringify(body)];
-      forces.redraw();
-      path.redraw();
-      draw();
-    },
-    (reason, calm, reply) => {
-      [refused, waits] = [reason, calm];
-      faults = new Map((reply?.faults ?? []).map(({ field, reason: why }) => [field, why]));
-      draw();
-    },
+  const answerTo = (body) => post("v1/motion", body);
+  function take(reply, body) {
+    [motion, asked] = [reply, JSON.stringify(body)];
+    forces.redraw();
+    path.redraw();
+    draw();
+  }
+  const motions = new Channel(answerTo, take, (reason, calm, reply) => {
+    [refused, waits] = [reason, calm];
+    faults = new Map((reply?.faults ?? []).map(({ field, reason: why }) => [field, why]));
+    if (reply?.refused && !motion) instead.push({ ...question(), ...mended() });
+    draw();
+  });
+  /** Where a link is refused there is no earlier motion: one without what is at fault. */
+  const instead = new Channel(
+    answerTo,
+    (reply, body) => motion ?? take(reply, body),
+    () => {},
   );
+  const faulty = () => [...new Set([...faults.keys()].map((name) => name.split(",")[0]))];
+  const mended = () =>
+    Object.fromEntries(faulty().map((name) => [name, PARTS[name] || about.start[name]]));
   const targets = new Channel(
     (body) => post("v1/solve-for", body),
     (reply, body) => {
@@ -198,8 +207,8 @@ export function motionPanel(store, moved, copy) {
       member === "phase"
         ? `${show(value, digits)} deg`
         : inUnit(LIKE[part], value, undefined, digits);
-    const whole = member === "phase" ? [amplitude, text] : [text, phase];
-    return { text, more: { [part]: whole.filter(Boolean).join(" @ ") } };
+    const both = member === "phase" ? [amplitude, text] : [text, phase];
+    return { text, more: { [part]: both.filter(Boolean).join(" @ ") } };
   }
 
   function roots() {
@@ -269,11 +278,17 @@ export function motionPanel(store, moved, copy) {
 
   /** Why there is no newer number; what is wrong with a field stands beside it. */
   function tell() {
-    const names = [...new Set([...faults.keys()].map((name) => name.split(",")[0]))];
+    const names = faulty();
     const fields = [...inputsOf(store.state), ...Object.keys(PARTS)];
     const told = names.length > 0 && names.every((name) => fields.includes(name));
     const check = `check ${names.map(called).join(", ")}`;
-    write("motion-status", refused ? (told ? `${capital(check)}.` : prose(refused)) : "");
+    const shown = (name) => {
+      const { text, value } = motion.inputs[name] ?? { text: "none" };
+      return `${called(name)} = ${text ?? inUnit(name, value)}`;
+    };
+    const whose = motion && `The number shown is that of ${names.map(shown).join(", ")}.`;
+    const reason = told ? whole(`${capital(check)}. ${whose ?? ""}`) : prose(refused ?? "");
+    write("motion-status", reason);
     $("motion-status").classList.toggle("bad", refused !== null && !waits);
     if (refused && told) write("short", `µ = –, ${check}`);
   }
