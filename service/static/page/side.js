@@ -278,7 +278,7 @@ export function sidePanel(store, moved, found) {
     if (!answer) return;
     const origin = `All are from the block ${answer.source} of the table ${answer.table.id}.`;
     const middle = middleOf(answer);
-    const rest = middle ? `at ${middle}` : answer.std && "without ±";
+    const rest = middle ? `at ${middle}` : answer.std && "without\u00a0±";
     write("middle", rest ? whole(`µ = ${inLine(answer)}; all else ${rest}.`) : "");
     list("values", numbers(answer, store.state.digits === "all"), origin);
     render(bars(answer), $("bars"));
