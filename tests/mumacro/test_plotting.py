@@ -98,7 +98,7 @@ PICTURES: dict[str, Callable[[Surrogate], Any]] = {
     ("name", "style"),
     # where the texts stand does not depend on colours: another style needs one of each form
     [(name, "default") for name in PICTURES]
-    + [(name, "dark_background") for name in ("map", "law", "motion", "cycle", "fit of sets")],
+    + [(name, "dark_background") for name in ("map", "law", "motion", "fit of sets")],
 )
 def test_nothing_is_cut_off_and_the_style_stays(
     surrogate: Surrogate, name: str, style: str
