@@ -14,7 +14,7 @@ MOST_MB = 400
 #: with a small share it is the attack before it
 SAME = "The same on 4 connections"
 #: these go on until a computation may take no longer
-LONGEST = ("Searches with 1,000", SAME, "A motion of a ball that takes a minute")
+LONGEST = ("Searches with 1,000", SAME, "The slowest motions of a ball")
 
 
 @pytest.fixture(scope="module")
