@@ -27,6 +27,7 @@ from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import kernels
 
 SPRINGS, MOST_SPRINGS = 32, 100_000  # number of springs of a ball: default and largest
+_ROUNDED = 1e-12  # a state may be this much beyond its limit, relatively
 _KERNEL = kernels[-1]
 
 
@@ -102,6 +103,9 @@ class Element:
         self.contact, self.springs, self.shape = contact, springs, k_.shape
         self._mu0, self._k = mu0_.ravel(), k_.ravel()
         self._limit = self._limits(Fz_)
+        # of the limit, that of each spring: mu_share_of_limit of kernel/element.c
+        i, n = np.arange(springs), float(springs)
+        self._shares = (3.0 * n * n - 3.0 * i * (i + 1.0) - 1.0) / (2.0 * n**3)
         self._forces = np.zeros((self._k.size, springs, 2))
 
     def step(self, dx: Numbers, dy: Numbers, Fz: Numbers | None = None) -> tuple[Any, Any]:
@@ -153,7 +157,7 @@ class Element:
     @property
     def state(self) -> Array:
         """Return the forces of the springs [N], a copy of shape ``(*contacts, springs, 2)``.  It
-        can be assigned."""
+        can be assigned; no force may be beyond the limit of its spring."""
         return self._forces.reshape(*self.shape, self.springs, 2).copy()
 
     @state.setter
@@ -163,7 +167,14 @@ class Element:
             raise InputError("state", array.shape, f"of the shape {shape}")
         if not np.isfinite(array).all():
             raise InputError("state", forces, "finite")
-        self._forces = array.reshape(self._forces.shape).copy()
+        array = array.reshape(self._forces.shape)
+        size, limit = np.hypot(array[..., 0], array[..., 1]), self._limit[:, None] * self._shares
+        beyond = np.argwhere(size > limit * (1.0 + _ROUNDED))
+        if beyond.size:
+            index, spring = beyond[0]
+            bound = f"at most the limit of its spring, {limit[index, spring]:.6g} N"
+            raise InputError("state", float(size[index, spring]), bound, int(index))
+        self._forces = array.copy()
 
     def __repr__(self) -> str:
         springs = f", {self.springs} springs" if self.contact == "ball" else ""

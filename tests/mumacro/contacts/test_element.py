@@ -327,6 +327,10 @@ def test_extreme_steps_keep_the_limit(way: Any) -> None:
             "state",
         ),
         (
+            lambda: setattr(Element(0.3, 10.0, 1e6), "state", [[3.0001, 0.0]]),
+            "state[0]",
+        ),
+        (
             lambda: setattr(Element(0.3, 10.0, 1e6), "state", [[math.inf, 0.0]]),
             "state",
         ),
