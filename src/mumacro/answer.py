@@ -193,7 +193,8 @@ class Answer(Result, Generic[Number]):
     @property
     def _always(self) -> tuple[str, ...]:
         """Return the paths of the default answer."""
-        return (*DEFAULT, *(name for name in BAND if hasattr(self, name)))
+        over_interval = self._cases is not None and self._cases.ends is not None
+        return (*DEFAULT, *BAND) if over_interval else DEFAULT
 
     @property
     def paths(self) -> list[str]:
@@ -305,7 +306,9 @@ class Answer(Result, Generic[Number]):
         >>> [*Surrogate.open().evaluate(**case, include=("groups",)).to_dict()]
         ['mu_macro', 'mu_ratio', 'regime', 'error_bound', 'source', 'groups']
         """
-        members = {path: getattr(self, path) for path in self._always} | nested(self.outputs)
+        members = {path: getattr(self, path) for path in self._always}
+        if self.outputs:
+            members |= nested(self.outputs)
         if said := self.remarks:
             members["remarks"] = said
         return members
