@@ -258,10 +258,13 @@ def left_of_a_disturbance(case: dict[str, Any], force: Array, steps: int) -> flo
         for name in ("x", "y", "normal")
     )
     x = x + case["v0"] / CASE["omega"] * tau
-    shift = np.array([1e-4, 0.7e-4])
+    shift, limit = np.array([1e-4, 0.7e-4]), CASE["mu0"] * (CASE["Fz"] + load[0])
     for _ in range(2):
         pair = Element(np.full(2, CASE["mu0"]), CASE["Fz"] + load[0], CASE["k"])
-        pair.state = np.stack([force, force + shift])[:, None]
+        disturbed = force + shift
+        disturbed *= min(1.0, limit / np.hypot(*disturbed))
+        shift = disturbed - force
+        pair.state = np.stack([force, disturbed])[:, None]
         for i in range(steps):
             pair.step(x[i + 1] - x[i], y[i + 1] - y[i], CASE["Fz"] + load[i + 1])
         size, after = np.hypot(*shift), pair.state[1, 0] - pair.state[0, 0]
