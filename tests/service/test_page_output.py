@@ -302,6 +302,8 @@ def test_a_target_is_reached_and_drawn(open_page: Any, surrogate: Surrogate) -> 
     page.wait_for("#solve-result", r"k = \S+ N/µm: µ = 0.29")
     page.type("#target", "2")
     page.wait_for("#solve-result", r"No value gives that: here it can be \S+ to \S+\.")
+    assert not page.texts("#map .target")
+    assert "Dash-dotted" not in page.text("#map-read")
     for text in ("half", "0.5 N", "-1"):
         page.type("#target", text)
         page.wait_for("#solve-status", "target")
@@ -313,14 +315,41 @@ AT_POINTER = r"^At the pointer: v₀ = .+; ṽ = (\S+), ỹ = (\S+), µ/µ₀ �
 
 def test_the_map_is_read_and_moved_on(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page()
-    page.touched("#map", 0.5, 0.4)
-    read = page.wait_for("#map-read", AT_POINTER)
-    v, y, ratio = (float(read[i]) for i in (1, 2, 3))
-    assert ratio == close(surrogate.mu_ratio(v, y), abs=0.03)
+    for x, up in ((0.3, 0.35), (0.45, 0.5), (0.55, 0.3), (0.5, 0.4)):
+        page.touched("#map", x, up)
+        read = page.wait_for("#map-read", AT_POINTER)
+        v, y, ratio = (float(read[i]) for i in (1, 2, 3))
+        assert ratio == close(surrogate.mu_ratio(v, y), abs=4e-3)
     page.touched("#map", 0.5, 0.4, click=True)
     shown = [float(page.shown()[name]) for name in ("ṽ", "ỹ")]
     assert shown == [close(v, rel=0.01), close(y, rel=0.01)]
     assert page.number() == close(0.3 * surrogate.mu_ratio(*shown), abs=2e-3)
+    # on the user's point it is the number, which is no reading of the map
+    assert page.text("#map-read").startswith("Your case: ")
+    assert page.text("#map-read").endswith(f"µ/µ₀ = {page.shown()['µ/µ₀']}")
+
+
+@pytest.mark.parametrize("plot", ["#map", "#law"])
+def test_a_step_of_the_keys_is_read_at_the_point(open_page: Any, plot: str) -> None:
+    page = open_page()
+    page.touched(plot, 0.7, 0.4)
+    page.wait_for(f"{plot}-read", "^At the pointer: ")
+    page.press(plot, "ARROW_RIGHT")
+    assert page.value("#field-v0") == "10.5 mm/s"
+    assert page.text(f"{plot}-read").startswith("Your case: ")
+
+
+def test_what_is_said_of_a_rigid_contact_and_of_k_is_no_more_than_it_means(open_page: Any) -> None:
+    page = open_page("#contact=rigid&direction=normal")
+    assert page.text("#advice") == "Rigid contact. The contact does not stretch before it slips."
+    assert "doubt" not in page.find("#advice").get_attribute("class")
+    limit = open_page("#contact=rigid")
+    assert "doubt" in limit.find("#advice").get_attribute("class")
+    assert "µ₀\u00a0Fz\u00a0/\u2060\u00a0y₀\u00a0=\u00a01.5\u00a0N" in limit.run(
+        "return document.querySelector('#advice').textContent;"
+    )
+    stiff = open_page("#k=100 N/um").text("#advice")
+    assert re.search(r"of k changes µ by 0\.\d+ %\.$", stiff)  # nothing is to be done about it
 
 
 def test_another_direction_is_chosen_while_the_pointer_is_on_the_map(open_page: Any) -> None:
@@ -565,7 +594,8 @@ def test_k_from_materials(open_page: Any) -> None:
     with open_page.faked(RECORDED, "#panel=stiffness") as page:
         page.click("#stiffness-form button")  # what is missing is named beside its field
         assert page.find("#argument-E").get_attribute("aria-invalid") == "true"
-        assert "ν" in page.text("#stiffness-status")
+        assert "required" in page.text("#about-nu")
+        assert page.text("#stiffness-status") == ""  # the fields tell it
         page.type("#argument-radius", "5 mm")
         page.choose("#material-1", "steel")
         page.type("#argument-E2", "rigid")
@@ -589,7 +619,8 @@ def test_k_from_materials(open_page: Any) -> None:
         assert page.value("#argument-radius") == "5 mm"  # what two geometries share stays
         page.type("#argument-length", "10 parsec")
         page.click("#stiffness-form button")
-        assert "length" in page.text("#stiffness-status")
+        assert "must be in metres" in page.text("#about-length")
+        assert page.text("#stiffness-status") == ""
         assert page.find("#argument-length").get_attribute("aria-invalid") == "true"
 
 

@@ -256,6 +256,7 @@ export function lawPanel(store, moved) {
     step(right, up, factor) {
       const value = numberOf(answer?.inputs[along()]);
       if (!right || value === undefined) return false;
+      read(null); // the point has moved, and the pointer has not
       moved({ [along()]: value * factor ** right }, 6);
       return true;
     },

@@ -11,6 +11,7 @@ import { about, inPrint, inUnit, inWords, show, toUnit, unitAt, whole } from "./
 const { contours } = d3;
 
 const DIGITS = 27; // pixels of a number of the legend
+const NEAR = 7; // pixels from the user's point, within which its own number is read
 const SIDES = 118; // pixels beside the map, with the numbers of its axes
 
 /** The relative deviation of a product of powers of inputs; 0 where none has one. */
@@ -35,6 +36,8 @@ export function mapPanel(store, moved, loaded) {
     (kind) => get(`static/page/map.json?${new URLSearchParams(kind)}`),
     (data, { contact, direction }) => {
       map = { ...data, contact, direction };
+      const ends = [Math.min, Math.max].map((end) => end(...data.mu_ratio) * data.unit);
+      [map.least, map.most] = ends;
       plot.redraw();
       map.shades = contours().size([data.v_tilde.n, data.y_tilde.n]).thresholds(data.levels)(
         data.mu_ratio.map((one) => one * data.unit),
@@ -98,15 +101,24 @@ export function mapPanel(store, moved, loaded) {
     legend(over);
   }
 
-  /** µ/µ₀ of the grid at a place of the frame, from 0 to 1 to the right and up. */
+  /** µ/µ₀ at a place of the frame, from 0 to 1 to the right and up: bilinear in the grid. */
   function ratioAt(u, w) {
-    const [column, row] = [u * (map.v_tilde.n - 1), w * (map.y_tilde.n - 1)].map(Math.round);
-    return map.mu_ratio[row * map.v_tilde.n + column] * map.unit;
+    const { n } = map.v_tilde;
+    const [x, y] = [u * (n - 1), w * (map.y_tilde.n - 1)];
+    const column = Math.min(Math.floor(x), n - 2);
+    const row = Math.min(Math.floor(y), map.y_tilde.n - 2);
+    const between = (a, b, share) => a + (b - a) * share;
+    const along = (at) => between(map.mu_ratio[at], map.mu_ratio[at + 1], x - column);
+    const at = row * n + column;
+    return between(along(at), along(at + n), y - row) * map.unit;
   }
+
+  /** Whether the map has a line of the target. */
+  const lined = () => target > map.least && target < map.most;
 
   /** The line of the target with its number, and the user's point. */
   function mark() {
-    if (target) {
+    if (lined()) {
       const values = map.mu_ratio.map((one) => one * map.unit);
       const shape = contours().size([map.v_tilde.n, map.y_tilde.n]).contour(values, target);
       plot.rimmed(outline(shape), "target");
@@ -228,13 +240,20 @@ export function mapPanel(store, moved, loaded) {
     return `Your case: ṽ = ${said(v, dv, true)}, ỹ = ${said(y, dy, map.y_tilde.log)}, ${mu}`;
   }
 
+  /** Whether a place of the plot is on the user's point, which a drag takes along. */
+  function onPoint([x, y]) {
+    if (store.dragged || !ownSizes()) return false;
+    const own = placeOf(answer);
+    return Math.hypot(x - plot.x(own.v), y - plot.y(own.y)) < NEAR;
+  }
+
   /** What stands below the map: at the pointer, else at the user's point. */
   function read(place) {
     pointer = place;
     if (!map) return;
-    const at = place && plot.holds(place) ? place : null;
+    const at = place && plot.holds(place) && !onPoint(place) ? place : null;
     if (!at) {
-      const line = target ? `Dash-dotted line: µ/µ₀ = ${show(target)}.` : "";
+      const line = lined() ? `Dash-dotted line: µ/µ₀ = ${show(target)}.` : "";
       const said = outside() || (placeOf(answer) ? yourCase() : "");
       write("map-read", whole(line ? `${said.replace(/[^.]$/, "$&.")} ${line}` : said));
       return;
@@ -268,6 +287,7 @@ export function mapPanel(store, moved, loaded) {
     step(right, up, factor) {
       if (!answer) return false;
       const names = { v0: right, [amplitude()]: up };
+      read(null); // the point has moved, and the pointer has not
       const changed = Object.entries(names).filter(([, way]) => way);
       moved(
         Object.fromEntries(

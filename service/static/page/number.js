@@ -26,6 +26,8 @@ import {
 } from "./words.js";
 
 const STIFFNESS = "k is known"; // row of the model
+const ALWAYS = "the contact does not stretch before it slips"; // of a rigid one, without a limit
+const SLIGHT = 0.01; // change of µ, below which k needs no advice
 const FEW = 4; // digits of the number
 
 const symbolOf = (name) => about.inputs[name === "omega" ? "f" : name].symbol;
@@ -63,7 +65,7 @@ export function inLine(answer) {
 /** The number in one line of a phone, with what of µ₀ is left; or which fields to check. */
 function shortOf(answer, faults) {
   if (faults.length) return `µ = –, check ${faults.map(called).join(", ")}`;
-  return `µ = ${inLine(answer)}, ${shareOf(answer)} left`;
+  return `µ = ${inLine(answer)}, ${some(answer)}${shareOf(answer)} left`;
 }
 
 /** The share of µ₀ that is left: a value, or both ends of an interval. */
@@ -73,8 +75,11 @@ function shareOf({ mu_macro_low: low, mu_macro_high: high, mu_ratio: ratio, inpu
   return from === to ? to : `${from.replace(" %", "")} to ${to}`;
 }
 
-/** What of µ₀ is left, in words; where an input has a deviation, the share has one, too. */
-const remains = (answer) => left(shareOf(answer), answer.std ? "about " : "");
+/** Where an input has a deviation, the share has one, too. */
+const some = (answer) => (answer.std ? "about " : "");
+
+/** What of µ₀ is left, in words. */
+const remains = (answer) => left(shareOf(answer), some(answer));
 
 /** The regimes of an interval of k, and where one begins: a law over it. */
 function regimes({ regime, border }, unit) {
@@ -166,14 +171,19 @@ function sayings(answer) {
     [STIFFNESS]: "rigid contact", // which is said of no other one as a remark
     ...(answer.state.contact === "ball" && { "one spring": "a ball" }),
   };
-  const rows = [...remarks, ...model.filter(({ row }) => !said.has(row))].map(({ row, text }) => ({
-    known: row === STIFFNESS,
-    words: capital(sentence(text.replace(/^rigid: /, ""), inputs)),
-    doubt: said.has(row) || DOUBTS.includes(row),
-    row: named[row] ?? row,
-  }));
+  const calm = (text) => text.replace(/: give k as an interval, or fit k$/, "");
+  const rows = [...remarks, ...model.filter(({ row }) => !said.has(row))].map((note) => {
+    const { row, effect } = note;
+    const text = note.text.replace(/^rigid: /, "");
+    return {
+      known: row === STIFFNESS,
+      words: capital(sentence(row === STIFFNESS && effect < SLIGHT ? calm(text) : text, inputs)),
+      doubt: (said.has(row) && text !== ALWAYS) || DOUBTS.includes(row),
+      row: named[row] ?? row,
+    };
+  });
   for (const one of rows)
-    if (one.known && !one.doubt) Object.assign(one, deciding(answer, one.words));
+    if (one.known && !said.has(STIFFNESS)) Object.assign(one, deciding(answer, one.words));
   const unit = inputs.k.unit ?? undefined;
   const ends = [inputs.k.low, inputs.k.high].map((end) => inUnit("k", end, unit));
   const middle =

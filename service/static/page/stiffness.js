@@ -11,7 +11,7 @@ const SUCH_AS = {
   radius: "such as 5 mm",
   diameter: "such as 10 mm",
   length: "such as 10 mm",
-  E: "such as 210 GPa",
+  E: "210 GPa",
   nu: "such as 0.3",
   E2: "as body 1",
   nu2: "as body 1",
@@ -53,7 +53,8 @@ export function stiffnessPanel(store, moved) {
       // what is not typed yet is missed when k is asked for
       faults = new Map(all.filter(([field]) => whole || typed[field]?.trim() || field === "Fz"));
       inputs = reply?.inputs ?? {};
-      write("stiffness-status", reason && (faults.size || !all.length) ? reason : "");
+      const told = [...faults.keys()].every((field) => names().includes(field)); // at the fields
+      write("stiffness-status", reason && !(told && all.length) ? reason : "");
       draw();
     },
   );
