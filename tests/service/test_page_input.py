@@ -746,6 +746,9 @@ def test_a_phone_shows_the_number_wherever_the_page_is(open_page: Any) -> None:
         assert page.find(place).rect["y"] - scrolled >= height  # covers nothing that is sought
     page.type("#field-y0", "0")
     assert page.text("#now") == "µ = 0.3000, 100 % left"
+    assert page.find("#from").rect["x"] == page.find("#to").rect["x"]
+    page.type("#field-y0", "2 µm ± 5 %")
+    assert re.fullmatch(r"µ = \S+ ± \S+, about \d+ % left", page.text("#now"))
     assert not open_page(width=1280, height=800).find("#now").is_displayed()
 
 

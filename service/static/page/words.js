@@ -181,7 +181,10 @@ export function middleOf({ mu_macro_low: low, mu_macro_high: high, inputs }) {
 /** A text in which no equation is broken over two lines. */
 export const whole = (text) =>
   text
-    .replace(/ ([=≈±/]) | to (?=\d)|(?<=µ₀) (?=Fz)|(?<=\d) (?=[%µa-zA-Z])/g, (gap) => gap.replaceAll(" ", "\u00a0"))
+    .replace(/(?<=µ₀) (?=Fz)/g, "\u00a0")
+    .replace(/ ([=≈±/]) | to (?=\d)|(?<=\d) (?=[%µa-zA-Z])/g, (gap) =>
+      gap.replaceAll(" ", "\u00a0"),
+    )
     .replaceAll("/", "/\u2060");
 
 /** A field of a request as the page calls it. */
