@@ -228,7 +228,7 @@ def _term(harmonic: int, amplitude: float, phase: float) -> dict[str, float]:
     return {"harmonic": harmonic, "amplitude": amplitude, "phase": phase}
 
 
-# one to three seconds of processor time, the slowest of a ball among 10,000 random ones
+# one to three seconds of processor time: the slowest of a ball in minutes of random motions
 SLOW_RIG = {"mu0": 0.637, "Fz": 9.55, "k": 1.293e4, "f": 1.167, "v0": 0.3666}
 SLOW_PARTS = {
     "x": [_term(1, 1.09e-4, 247.7), _term(20, 0.2727, 225.9), _term(1, 3.042, 335.8)],
