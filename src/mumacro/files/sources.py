@@ -244,8 +244,8 @@ class TextSource:
 
 def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] | None:
     """Return the rows in some lines, and their columns, if every line is a row that Arrow reads:
-    each input is a number or a gap, and no cell may begin a comment or a row of statistics.  Return
-    None if the lines must be examined one by one."""
+    each input is a number or a gap, and no line may begin like a comment or a row of statistics.
+    Return None if the lines must be examined one by one."""
     account, text, sep = table.account, piece.text, table.account.sep
     shows_signs = "." in text or ('"' if sep == "," else ",") in text
     if (
@@ -263,7 +263,10 @@ def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] |
         return None
     lines = piece.lines
     numbers = [columns[i] for i in table.layout.inputs]
-    texts = [column for i, column in enumerate(columns) if i not in table.layout.inputs]
+    # a line begins with a text before the first column in which every line has a number
+    full = (i for i in sorted(table.layout.inputs) if not columns[i].null_count)
+    begins = columns[: next(full, None)]
+    texts = [column for i, column in enumerate(begins) if i not in table.layout.inputs]
     has_number = functools.reduce(pc.or_, map(pc.is_valid, numbers))
     if (
         len(has_number) != len(lines)
