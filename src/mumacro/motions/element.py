@@ -103,9 +103,6 @@ class Element:
         self.contact, self.springs, self.shape = contact, springs, k_.shape
         self._mu0, self._k = mu0_.ravel(), k_.ravel()
         self._limit = self._limits(Fz_)
-        # of the limit, that of each spring: mu_share_of_limit of kernel/element.c
-        i, n = np.arange(springs), float(springs)
-        self._shares = (3.0 * n * n - 3.0 * i * (i + 1.0) - 1.0) / (2.0 * n**3)
         self._forces = np.zeros((self._k.size, springs, 2))
 
     def step(self, dx: Numbers, dy: Numbers, Fz: Numbers | None = None) -> tuple[Any, Any]:
@@ -168,7 +165,7 @@ class Element:
         if not np.isfinite(array).all():
             raise InputError("state", forces, "finite")
         array = array.reshape(self._forces.shape)
-        size, limit = np.hypot(array[..., 0], array[..., 1]), self._limit[:, None] * self._shares
+        size, limit = np.hypot(array[..., 0], array[..., 1]), self._limits_of_springs()
         beyond = np.argwhere(size > limit * (1.0 + _ROUNDED))
         if beyond.size:
             index, spring = beyond[0]
@@ -195,6 +192,14 @@ class Element:
                 "Fz", float(flat[index]), "finite and >= 0, with mu0 Fz below 1.8e308", index
             )
         return limit
+
+    def _limits_of_springs(self) -> Array:
+        """Return the limits of the springs [N], (n, springs): their forces if all of them slip."""
+        forces, sums = np.zeros_like(self._forces), np.empty((self._k.size, 2))
+        stiff = np.full(self._k.size, 4.0 * self.springs)
+        still = np.zeros(self._k.size)
+        _KERNEL.element_steps(self._limit, self._limit, stiff, self._limit, still, forces, sums)
+        return forces[..., 0]
 
     def _per_contact(self, value: Numbers, name: str) -> Array:
         """Return ``value`` for every contact, finite, (n,) and contiguous."""
