@@ -448,9 +448,8 @@ class Failures:
             raise
         except Exception as error:
             _log_unexpected(error, scope)
-            if (
-                STATUS in scope["state"]
-            ):  # it has begun: end the connection without the end of the answer
+            # an answer that has begun ends with its connection, without its end
+            if STATUS in scope["state"]:
                 raise ClientDisconnect from error
             try:
                 answer = problem_of(meaning(error, scope), scope)

@@ -124,10 +124,10 @@ class Account:
     def _is_plain(self, text: str) -> bool:
         """Return whether a line needs no closer look, as most rows do: after the first row, all
         inputs begin like numbers, and so does the first cell."""
-        if self.first is None or '"' in text or text.count(self.sep) != self.width - 1:
+        if self.first is None or 0 not in self.units.inputs or '"' in text:
             return False
-        cells = text.split(self.sep)
-        return 0 in self.units.inputs and all(
+        cells = text.split(self.sep, self.width)
+        return len(cells) == self.width and all(
             cells[i].lstrip("+-.")[:1] in _DIGITS for i in self.units.inputs
         )
 
