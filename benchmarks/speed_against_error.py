@@ -453,7 +453,7 @@ def convergence(points: int, rounds: int, quick: bool) -> str:  # noqa: ARG001
             before = process_time()
             table = _one_spring(sweep, tolerance)
             seconds, solves = process_time() - before, sweep.n_solves
-        error = np.abs(Surrogate(table, "built", threads=1).mu_ratio(v, y) - mu)
+        error = np.abs(Surrogate(table, "built").on_threads(1).mu_ratio(v, y) - mu)
         largest, most = float(error.max()), float(np.quantile(error, 0.99))
         cost = solves, _bytes(table), seconds
         lines.setdefault(OURS, []).append((*cost, largest, most))

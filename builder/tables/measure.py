@@ -85,9 +85,8 @@ def _stating(
         for block in entry.blocks
     ]
     contacts = table.contacts | {entry.name: replace(entry, blocks=blocks)}
-    return Surrogate(
-        replace(table, border=border, contacts=contacts), surrogate.path, surrogate.threads
-    )
+    measured = Surrogate(replace(table, border=border, contacts=contacts), surrogate.path)
+    return measured.on_threads(surrogate.threads)
 
 
 def block_errors(

@@ -68,10 +68,10 @@ def evaluate_labelled(
         bound = "objects of one library: pandas, or xarray and Dask"
         raise InputError("inputs", sorted(libraries), bound)
     if frame == "dask":
-        return _of_parts(surrogate.on_one_thread(), cases, values, include, strict)
+        return _of_parts(surrogate.on_threads(1), cases, values, include, strict)
     if libraries & {"xarray", "dask"}:
         # Dask has its own threads
-        return _of_chunks(surrogate.on_one_thread(), values, include, strict)
+        return _of_chunks(surrogate.on_threads(1), values, include, strict)
     index = _common_index(cases if frame == "pandas" else None, values)
     of_cases = Cases.of(values, strict=strict)
     answer = surrogate.answer(of_cases, chosen(include, of_cases))

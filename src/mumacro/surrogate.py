@@ -1,6 +1,5 @@
 """Hold a table, and answer cases and points (v~, y~): this is the object that users have."""
 
-import copy
 import functools
 import math
 from collections.abc import Iterable, Mapping
@@ -84,9 +83,7 @@ class Surrogate:
     (0.240467, 'stick_slip')
     """
 
-    def __init__(self, table: Table, path: str | Path, threads: int | None = None) -> None:
-        if threads is not None and not (type(threads) is int and 1 <= threads <= 1024):
-            raise InputError("threads", threads, "None or a whole number from 1 to 1024")
+    def __init__(self, table: Table, path: str | Path) -> None:
         self._image: bytes | None = None
         self.path = Path(path)
         self.table = table
@@ -98,7 +95,7 @@ class Surrogate:
         self.max_abs_error = float(attributes.get("verified_max_abs_error", math.nan))
         self.max_rel_error = float(attributes.get("verified_max_rel_error", math.nan))
         #: the table as the kernel reads it
-        self.tabulated = Tabulated(table, self.path, threads)
+        self.tabulated = Tabulated(table, self.path)
         self.border = self.tabulated.border
         self._pointer = self.tabulated.pointer
 
@@ -110,7 +107,8 @@ class Surrogate:
         ----------
         table : str, Path, float or None
             A table file; or a tolerance of mu~ [-], for the smallest bundled table that meets it;
-            or None for the tightest bundled table.
+            or None for the tightest bundled table.  A bundled table is read once in a process,
+            unless its path is given.
         threads : int, optional
             Number of threads for large arrays; 1 never starts a thread.  Default: all processors in
             a call from the main thread of a program; one in other threads and in child processes,
@@ -129,12 +127,20 @@ class Surrogate:
         >>> Surrogate.open(1e-8).id
         'mumacro-1e-10'
         """
-        path = Path(table) if isinstance(table, (str, Path)) else bundled_table(table)
-        return cls._of_image(read_image(path), path, threads)
+        if isinstance(table, (str, Path)):
+            return cls._of_file(Path(table)).on_threads(threads)
+        return cls._of_bundled(bundled_table(table)).on_threads(threads)
 
     @classmethod
-    def _of_image(cls, image: bytes, path: Path, threads: int | None) -> Self:
-        surrogate = cls(parse_table(image, path), path, threads)
+    @functools.cache
+    def _of_bundled(cls, path: Path) -> Self:
+        return cls._of_file(path)
+
+    @classmethod
+    def _of_file(cls, path: Path, image: bytes | None = None) -> Self:
+        """Return the table of a file, whose bytes ``image`` are read if they are not given."""
+        image = read_image(path) if image is None else image
+        surrogate = cls(parse_table(image, path), path)
         surrogate._image = image
         return surrogate
 
@@ -189,10 +195,15 @@ class Surrogate:
         cases = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": np.array(v), **swing}
         return [str(name) for name in self.evaluate(cases, **kind.names).regime]
 
-    def on_one_thread(self) -> Self:
-        """Return the same table, whose calls start no thread."""
-        other = copy.copy(self)
-        other.tabulated = self.tabulated.on_one_thread()
+    def on_threads(self, threads: int | None) -> Self:
+        """Return the same table, whose calls use so many threads, see :meth:`open`."""
+        if threads is None and self.tabulated.threads is None:
+            return self
+        if threads is not None and not (type(threads) is int and 1 <= threads <= 1024):
+            raise InputError("threads", threads, "None or a whole number from 1 to 1024")
+        other = object.__new__(type(self))  # copy.copy would read the file again, see __reduce__
+        other.__dict__ |= self.__dict__
+        other.tabulated = self.tabulated.on_threads(threads)
         return other
 
     @property
@@ -688,10 +699,9 @@ KNOWN_CONTINUOUS = 0.9545954718694023
 def _reopen(path: str, checksum: str, threads: int | None, image: bytes | None) -> Surrogate:
     """Unpickle a surrogate: from the bytes, or from the bundled table of this name."""
     if image is not None:
-        return Surrogate._of_image(image, Path(path), threads)
-    surrogate = Surrogate.open(
-        next((table for table in bundled_tables() if table.name == path), path), threads
-    )
+        return Surrogate._of_file(Path(path), image).on_threads(threads)
+    here = next((table for table in bundled_tables() if table.name == path), Path(path))
+    surrogate = Surrogate._of_bundled(here).on_threads(threads)
     if surrogate.checksum != checksum:
         mismatch = (
             f"holds {surrogate.checksum[:12]}, the pickled surrogate was made from {checksum[:12]}"

@@ -80,7 +80,7 @@ def test_one_thread_means_that_none_is_started(
     expected = everything(table)
     monkeypatch.setattr(threading.Thread, "start", refuse)
     assert everything(alone) == expected
-    assert everything(table.on_one_thread()) == expected
+    assert everything(table.on_threads(1)) == expected
     with pytest.raises(AssertionError, match="a thread was started"):
         table.mu_ratio(*points(N))
 

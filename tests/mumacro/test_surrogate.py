@@ -222,8 +222,17 @@ def test_empty_arrays_give_empty_answers(
 
 def test_a_copy_on_one_thread_leaves_the_original_its_threads(fine: Surrogate) -> None:
     several = Surrogate.open(fine.path, threads=3)
-    assert several.on_one_thread().threads == 1
+    assert several.on_threads(1).threads == 1
     assert several.threads == 3
+    in_memory = Surrogate(fine.table, "this table")
+    assert in_memory.on_threads(1).mu_ratio(0.1, 0.5) == fine.mu_ratio(0.1, 0.5)
+
+
+def test_a_bundled_table_is_read_once() -> None:
+    assert Surrogate.open() is Surrogate.open()
+    assert Surrogate.open(1e-10, threads=1).table is Surrogate.open(1e-10).table
+    path = Surrogate.open().path
+    assert Surrogate.open(path).table is not Surrogate.open(path).table
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1.0, True, "2", 100_000])

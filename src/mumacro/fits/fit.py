@@ -7,7 +7,6 @@ limits of a soft and of a rigid contact, and the ranges that the points allow.  
 a plot needs matplotlib.
 """
 
-import functools
 import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -81,16 +80,11 @@ def fit(
     >>> f"{result.values['k']:.2g} {result.values['mu0']:.3f}"
     '1e+06 0.300'
     """
-    table = surrogate or _bundled_surrogate()
+    table = surrogate or Surrogate.open()
     result = _Problem(data, unknowns, contact, direction, table, fixed).solve()
     for text in result.warnings:
         warnings.warn(text, stacklevel=3)  # errstate wraps this function
     return result
-
-
-@functools.cache
-def _bundled_surrogate() -> Surrogate:
-    return Surrogate.open()
 
 
 class _Minimum(NamedTuple):

@@ -35,9 +35,10 @@ class Tabulated:
     """Hold a table, its cells as the kernel reads them, and the number of threads that a call may
     use."""
 
-    def __init__(self, table: Table, path: Path, threads: int | None) -> None:
+    def __init__(self, table: Table, path: Path) -> None:
         self.table = table
-        self.threads = threads
+        #: the most threads of a call; None for the number that suits the caller
+        self.threads: int | None = None
         self.border = Border(table.border)
         _check_border(table.border, path)
         #: by code of the contact, each with at least the cells of mu~; computed on first use
@@ -46,10 +47,10 @@ class Tabulated:
         #: for one spring, with the cells of mu~
         self.pointer = self._springs.pointer
 
-    def on_one_thread(self) -> Self:
-        """Return the same table, but its calls start no thread."""
+    def on_threads(self, threads: int | None) -> Self:
+        """Return the same table, whose calls use so many threads."""
         other = copy.copy(self)
-        other.threads = 1
+        other.threads = threads
         return other
 
     def data(self, name: str = "mu_ratio", kind: Kind = SPRING) -> Data:
