@@ -8,7 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "_ext")]
 
-from mumacro.version import __version__  # noqa: E402 - found by the line above
+from mumacro import __version__  # noqa: E402 - found by the line above
 
 project = "mumacro"
 author = "the mumacro developers"

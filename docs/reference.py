@@ -426,7 +426,8 @@ def _entry(title: str) -> Iterator[str]:
         yield markdown_of(inspect.getdoc(value) or "")
     else:
         name = title.rsplit(".", 1)[1]
-        home = next((m for m in (module, "mumacro.answer") if ("", name) in _comments(m)), module)
+        places = (module, "mumacro.outputs.answer")
+        home = next((place for place in places if ("", name) in _comments(place)), module)
         yield f"### {title}\n\n{_comment(home, '', name)}"
 
 

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.answer import Answer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases, named, other_amplitude
 from mumacro.kernel.arrays import Codes
+from mumacro.outputs.answer import Answer
 from mumacro.outputs.entry import Output
 from mumacro.outputs.evaluation import chosen, cost
 from mumacro.results import Note, add

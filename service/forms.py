@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mumacro.answer import TEXTS, Answer, nested
 from mumacro.errors import InputError
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, named
 from mumacro.inputs.fields import (
@@ -29,6 +28,7 @@ from mumacro.inputs.fields import (
 )
 from mumacro.inputs.names import unknown_name
 from mumacro.kernel.stopping import look
+from mumacro.outputs.answer import TEXTS, Answer, nested
 
 from .json_text import NotRead, count, decode_batch, decode_columns, decode_rows, dump
 from .models.inputs import INPUTS, MAX_REASONS, entry

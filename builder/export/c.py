@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import mumacro
+from mumacro import __version__
 from mumacro.errors import MumacroError
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.quadrature import driven_rule
@@ -17,7 +18,6 @@ from mumacro.table import atlas
 from mumacro.table.atomic import write_whole
 from mumacro.table.blocks import Table, TabulatedContact
 from mumacro.table.polynomials import block_rows, border_cells, outer_cells, quantity_cells
-from mumacro.version import __version__
 
 #: tolerance of the table that is exported by default: a C program holds all of its numbers as text
 DEFAULT_TOLERANCE = 1e-7

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from mumacro import MumacroError, Surrogate
+from mumacro import MumacroError, Surrogate, __version__
 from mumacro.table.atlas import CHARTS, QUANTITY_NAMES
 from mumacro.table.blocks import Block, Table, TabulatedContact
 from mumacro.table.netcdf import read_table, write_table
 from mumacro.table.polynomials import Border
-from mumacro.version import __version__
 
 from ..solver.ball import Springs
 from ..solver.sweep import Sweep

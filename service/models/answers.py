@@ -10,9 +10,9 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import BaseModel, Field, WithJsonSchema, create_model
 
-from mumacro.answer import BAND
 from mumacro.inputs.fields import AMPLITUDE, ContactName, DirectionName
 from mumacro.outputs import MEMBERS, OUTPUTS
+from mumacro.outputs.answer import BAND
 from mumacro.outputs.entry import Member
 
 from .inputs import Name

@@ -9,7 +9,6 @@ import numpy as np
 from fastapi import Query, Request, Response
 
 import mumacro
-from mumacro.answer import Answer, nested
 from mumacro.errors import InputError
 from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import Cases, ends_in, named
@@ -17,6 +16,7 @@ from mumacro.inputs.stiffening import Stiffening
 from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.outputs import MEMBERS
+from mumacro.outputs.answer import Answer, nested
 from mumacro.outputs.evaluation import chosen
 from mumacro.questions.law import Law
 from mumacro.questions.solve_for import TableSolution

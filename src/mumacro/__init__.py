@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.errors import missing as _missing
-from mumacro.version import __version__
+
+#: the wheel, the tables and the service read it here
+__version__ = "0.1.0"
 
 if _TYPE_CHECKING:
     from mumacro import closed_forms, plotting, stiffness, validity
-    from mumacro.answer import Answer
     from mumacro.fits.fit import fit
     from mumacro.fits.fitted import Fit
     from mumacro.fits.loop import fit_loop
@@ -25,6 +26,7 @@ if _TYPE_CHECKING:
     from mumacro.motions.harmonics import Harmonics, harmonics
     from mumacro.motions.motion import Motion, motion
     from mumacro.motions.solve_motion import MotionSolution, solve_motion
+    from mumacro.outputs.answer import Answer
     from mumacro.questions.law import law
     from mumacro.questions.solve_for import solve_for
     from mumacro.surrogate import Surrogate
@@ -50,7 +52,7 @@ _PLACES = {
     "solve_for": "questions.solve_for",
     "MotionSolution": "motions.solve_motion",
     "solve_motion": "motions.solve_motion",
-    "Answer": "answer",
+    "Answer": "outputs.answer",
     "Element": "motions.element",
     "Surrogate": "surrogate",
     "open": "surrogate",

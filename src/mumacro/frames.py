@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.answer import TEXTS, Answer
 from mumacro.errors import InputError
 from mumacro.inputs.carried import labelled_in_si, library
 from mumacro.inputs.cases import Cases, library_of
 from mumacro.inputs.columns import is_column, read_column
 from mumacro.inputs.fields import quantity_of
 from mumacro.outputs import MEMBERS
+from mumacro.outputs.answer import TEXTS, Answer
 from mumacro.outputs.evaluation import chosen
 from mumacro.results import Note, add
 from mumacro.table.atlas import REGIMES, SOURCES

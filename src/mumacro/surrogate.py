@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mumacro import plotting
-from mumacro.answer import Answer
 from mumacro.errors import InputError, TableError
 from mumacro.frames import evaluate_labelled, frame_of_cases
 from mumacro.inputs.case import NUMBERS, read
@@ -42,6 +41,7 @@ from mumacro.inputs.fields import (
 from mumacro.kernel.arrays import Array, common_shape, flat
 from mumacro.kernel.threads import default_threads
 from mumacro.outputs import evaluation
+from mumacro.outputs.answer import Answer
 from mumacro.outputs.entry import Output
 from mumacro.outputs.evaluation import chosen, names_in
 from mumacro.outputs.tabulated import SCALAR_KERNEL, Tabulated
@@ -52,7 +52,7 @@ from mumacro.table.bundled import bundled_table, bundled_tables
 from mumacro.table.netcdf import json_attributes, parse_table, read_image
 
 if TYPE_CHECKING:
-    from mumacro.answer import AnswerWithGradient, IntervalAnswer
+    from mumacro.outputs.answer import AnswerWithGradient, IntervalAnswer
 
 _RATIO = SCALAR_KERNEL.ratio
 _FLOAT = np.dtype(np.float64)
@@ -646,9 +646,9 @@ class Surrogate:
     @staticmethod
     def in_words(answer: Answer[float]) -> tuple[Rows, Rows, str]:
         """Return the answer to one case as the command prints it and a notebook shows it."""
-        from mumacro.words import of_one_case  # loaded only if an answer is shown
+        from mumacro.validity import in_words  # loaded only if an answer is shown
 
-        return of_one_case(answer)
+        return in_words(answer)
 
     def _many(
         self, names: tuple[str, ...], six: tuple[Any, ...], shape: tuple[int, ...], kind: Kind

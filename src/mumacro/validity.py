@@ -1,5 +1,8 @@
-"""Tell how far the model holds for a case: the rows of docs/validity.md that apply to it, with the
-size of each effect.
+"""Tell how far the model holds for a case, and put its answer into words, as the command prints it
+and a notebook shows it.
+
+How far the model holds is said by the rows of docs/validity.md that apply to the case, with the
+size of each effect; the digits of the answer follow from it.
 
 The error bound of an answer is the distance of the table from the model.  The distance of the model
 from a real contact is another question, and usually it is larger.  Two assumptions cannot be
@@ -13,15 +16,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mumacro.answer import BAND, Answer
 from mumacro.errors import InputError
 from mumacro.inputs.doubts import FURTHEST, UNITS
-from mumacro.inputs.fields import AMPLITUDE, RAD_PER_CYCLE, RIGID, SPRINGS_OF, Kind, kind_of
+from mumacro.inputs.fields import (
+    AMPLITUDE,
+    MEASURED_AS,
+    PER_UNIT,
+    RAD_PER_CYCLE,
+    RIGID,
+    SPRINGS_OF,
+    Kind,
+    kind_of,
+)
 from mumacro.inputs.numbers import plain
 from mumacro.inputs.stiffening import ROUGH, Stiffening
+from mumacro.inputs.units import choose_unit, format_number, known, suit_unit, tidy_zeros
+from mumacro.outputs import MEMBERS
+from mumacro.outputs.answer import BAND, Answer
 from mumacro.outputs.settling import REMAINING, decay_of_springs
 from mumacro.outputs.tabulated import Tabulated
-from mumacro.results import ASSUMES, Note, Row
+from mumacro.results import ASSUMES, Note, Row, Rows
 
 #: names of the rows, as in the table of docs/validity.md
 ROWS = (
@@ -41,6 +55,19 @@ _TILT, _NORMAL = 0.01, 1.21  # misalignment; normal over tangential stiffness of
 # micrometres
 _ADAPTS = 1e-7, 1e-4
 _PERIODS, _WATTS = 100.0, 0.1  # above these there is a row on settling, and one on heat
+REGIMES = {
+    "continuous": "slips all the time",
+    "stick_slip": "sticks during a part of each period",
+    "static": "at rest: the limit v0 -> 0",
+    "partial_slip": "the rim of the contact slips all the time, its middle sticks during a part of "
+    "each period",
+    "reverse_slip": "slips forwards and backwards in each period",
+}
+#: rows of :data:`ROWS` that have another name for a contact
+_CALLED = {("one spring", "ball"): "a ball"}
+_SHOWN = ("std", "std_share", "gradient")  # these are shown in their own rows
+#: paths that have the unit of an input
+_UNIT_OF = {"limits.v0_crit": "v0", "groups.l0": "y0"}
 
 
 class Said(NamedTuple):
@@ -289,3 +316,83 @@ def _on_cycle(answer: Answer[float], six: Mapping[str, Any]) -> list[Note]:
         )
         notes.append(Note(ASSUMES, text, "no wear, no heating"))
     return notes
+
+
+# --- in words -------------------------------------------------------------------------------------
+
+
+def in_words(answer: Answer[Any], units: Mapping[str, str] | None = None) -> tuple[Rows, Rows, str]:
+    """Return the answer to one case in three parts: rows of name, value, unit and meaning; what the
+    answer assumes and its remarks, each with its type; and the numerical error.
+
+    Numbers have their significant digits, and the unit that ``units`` has for their input, or else
+    a suitable unit.
+    """
+    said = notes_of(answer, units)
+    rows = _rows_in_words(answer, said.digits, units or {})
+    cases: Any = answer.cases
+    contact, k = cases.kind.names["contact"], cases.columns["k"]
+    unit = suit_unit("N/m", k)
+    size = unit.scale.of_si(k)
+    advice = f"give k={0.9 * size:.3g}..{1.1 * size:.3g}{unit.symbol}"
+    notes: Rows = []
+    for note in said.notes:
+        row = _CALLED.get((note.row, contact), note.row)
+        text = note.text.replace("give k as an interval", advice)
+        notes.append((note.word, note._replace(row=row, text=text).about))
+    return rows, notes, f"numerical error  {answer.error_bound:.2g}"
+
+
+def _stiffness(k: float, units: Mapping[str, str]) -> str:
+    """Return a stiffness that was given, or the middle of an interval."""
+    unit = choose_unit("k", k, units)
+    return f"{tidy_zeros(format_number(k, unit, 6))} {unit.symbol}"
+
+
+def _rows_in_words(answer: Any, count: int, units: Mapping[str, str]) -> Rows:
+    """Return an answer as rows of name, value, unit, meaning."""
+    surrogate, cases, outputs = answer._surrogate, answer.cases, answer.outputs
+    kind, std = cases.kind, outputs.get("std", 0.0)
+
+    def number(value: float, error: float = 0.0, deviation: float = 0.0) -> str:
+        return known(value, count, error, deviation)
+
+    error, mu0 = answer.error_bound, cases.columns["mu0"]
+    groups = "Fz_amplitude / Fz" if kind.normal else "y0 k / (mu0 Fz)"
+    ratio = number(answer.mu_ratio, error / mu0, std / mu0)
+    rows: Rows = [
+        ("mu_macro", number(answer.mu_macro, error, std), "[-]", ""),
+        ("mu_ratio", ratio, "[-]", "mu_macro / mu0"),
+        ("regime", answer.regime, "", REGIMES[answer.regime]),
+        ("v_tilde", number(answer.v_tilde), "[-]", "v0 k / (mu0 Fz omega)"),
+        ("y_tilde", number(answer.y_tilde), "[-]", groups),
+        ("source", answer.source, "", f"of {surrogate.id}, tolerance {surrogate.tolerance:g}"),
+    ]
+    if cases.ends is not None:
+        low, high = (_stiffness(float(end), units) for end in cases.ends)
+        middle = _stiffness(cases.columns["k"], units)
+        least, most = (number(x, error) for x in (answer.mu_macro_low, answer.mu_macro_high))
+        meaning = f"for k from {low} to {high}; {rows[0][1]} at {middle}, the geometric middle"
+        rows[0] = ("mu_macro", f"{least} to {most}", "[-]", meaning)
+    if "std" in outputs:
+        shares = {name: outputs[f"std_share.{name}"] for name in kind.fields}
+        parts = ", ".join(f"{name} {100.0 * x:.3g} %" for name, x in shares.items() if x > 0.0)
+        meaning = f"standard deviation; {parts}" if parts else "standard deviation"
+        rows[0] = ("mu_macro", f"{rows[0][1]} ± {known(std, 2)}", "[-]", meaning)
+    for name, slope in (answer.gradient or {}).items():
+        per = PER_UNIT[MEASURED_AS.get(name, name)]
+        error = answer.gradient_bound[name]
+        rows.append((f"slope {name}", number(slope, error), f"[{per}]", f"d mu_macro / d {name}"))
+    for path, value in outputs.items():
+        if path.partition(".")[0] in _SHOWN or "_bound" in path:
+            continue
+        name, dot, member = path.partition(".")
+        error = outputs.get(f"{name}_bound{dot}{member}", 0.0)
+        typed = _UNIT_OF.get(path, "")
+        if typed in units:
+            unit = choose_unit(typed, value, units)
+        else:
+            unit = suit_unit(MEMBERS[path].unit, value)
+        text = format_number(value, unit, count, error)
+        rows.append((path, text, f"[{unit.symbol}]", MEMBERS[path].meaning))
+    return rows

@@ -10,12 +10,12 @@ import pandas as pd
 import pytest
 
 from mumacro import InputError, Surrogate, solve_for
-from mumacro.answer import TEXTS
 from mumacro.inputs.cases import Cases, named
 from mumacro.inputs.fields import KINDS, Kind
 from mumacro.motions.element import Element
 from mumacro.motions.motion import motion
 from mumacro.outputs import MEMBERS, OUTPUTS
+from mumacro.outputs.answer import TEXTS
 from tests.support.cases import CASE, Case, as_kind, flat, tables, without
 from tests.support.comparing import close
 

@@ -38,7 +38,7 @@ def test_there_are_examples() -> None:
         if test.examples
     }
     used = {
-        "answer.Answer",
+        "outputs.answer.Answer",
         "table.bundled.bundled_tables",
         "fits.fit.fit",
         "motions.element.Element",

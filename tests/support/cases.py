@@ -54,7 +54,7 @@ def flat(std: Mapping[str, Any]) -> Case:
 
 def as_kind(
     case: Mapping[str, Any], pair: tuple[str, str], share: float = 0.4
-) -> tuple[Case, Any, Case]:
+) -> tuple[Mapping[str, Any], Any, Case]:
     """The keywords of a pair, its fields, and ``case`` with Fz_amplitude = ``share`` Fz where the
     pair has it."""
     kind = kind_of(*pair)

@@ -27,11 +27,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
+from mumacro import __version__
 from mumacro.inputs.fields import AMPLITUDE, CONTACTS, DIRECTIONS, INPUTS
 from mumacro.inputs.units import unit_of
 from mumacro.table import atlas
 from mumacro.table.blocks import Table
-from mumacro.version import __version__
 
 from ..c import ExportError, header_text
 

@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 from typing import Any
 
+from mumacro import __version__
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, as_json, in_columns, open_table, read_case
 from mumacro.inputs.fields import kind_of
-from mumacro.validity import rows_of
-from mumacro.version import __version__
-from mumacro.words import of_one_case as words_of_one_case
+from mumacro.validity import in_words, rows_of
 
 EXAMPLE = "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz v0=10mm/s"
 
@@ -32,6 +31,6 @@ def run(words: Sequence[str], description: str) -> str:
     if options.json:
         model = {"model": rows_of(answer)} if options.model else {}
         return as_json({**answer.to_dict(), **model}, surrogate)
-    rows, notes, error = words_of_one_case(answer, case.units)
+    rows, notes, error = in_words(answer, case.units)
     line = common.case_line(case, kind)
     return "\n".join([line, in_columns(rows), *([in_columns(notes)] if notes else []), error])

@@ -13,7 +13,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from mumacro.answer import BAND, DEFAULT, TEXTS
 from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.carried import units_of_fields
@@ -35,6 +34,7 @@ from mumacro.inputs.numbers import Signs
 from mumacro.inputs.units import Scale, in_si, scale_of, split_unit, too_large_in_si
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.outputs import OUTPUTS
+from mumacro.outputs.answer import BAND, DEFAULT, TEXTS
 from mumacro.outputs.evaluation import chosen, names_in, paths_of
 from mumacro.results import Note
 from mumacro.surrogate import Surrogate

@@ -20,7 +20,8 @@ a G* is the stiffness before slip.  ``direction="along"`` shakes along the slidi
 
 import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Required, TypedDict, TypeVar
 
 from numpy.typing import ArrayLike
@@ -238,39 +239,41 @@ FIELDS_OF = (
 )
 
 
-class Kind(NamedTuple):
-    """Hold a contact and a direction by their codes in the kernel."""
-
+class _Codes(NamedTuple):
     contact: int
     direction: int
 
-    @property
+
+class Kind(_Codes):
+    """Hold a contact and a direction by their codes in the kernel."""
+
+    @cached_property
     def normal(self) -> bool:
         """Return whether the normal force oscillates."""
         return DIRECTIONS[self.direction] == "normal"
 
-    @property
+    @cached_property
     def amplitude(self) -> str:
         """Return the input that is the amplitude of the oscillation."""
         return AMPLITUDES[self.normal]
 
-    @property
+    @cached_property
     def other_amplitude(self) -> str:
         """Return the amplitude of the other directions."""
         return AMPLITUDES[not self.normal]
 
-    @property
+    @cached_property
     def fields(self) -> tuple[str, ...]:
         """Return the names of the six inputs: :data:`mumacro.inputs.fields.FIELDS`, with
         Fz_amplitude instead of y0 for normal."""
         return FIELDS_OF[self.direction]
 
-    @property
-    def names(self) -> dict[str, Any]:
+    @cached_property
+    def names(self) -> Mapping[str, Any]:
         """Return contact and direction as keywords of ``evaluate``."""
         return {"contact": CONTACTS[self.contact], "direction": DIRECTIONS[self.direction]}
 
-    @property
+    @cached_property
     def columns(self) -> tuple[str, ...]:
         """Return the names of the columns that a table of cases may have."""
         return (*self.fields, "f")

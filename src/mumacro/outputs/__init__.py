@@ -8,7 +8,7 @@ numbers are those of Benad, Nakano, Popov, Popov, "Active control of friction by
 oscillations" (Friction, 2018).
 """
 
-from mumacro.answer import BAND
+from mumacro.outputs.answer import BAND
 from mumacro.outputs.deviation import STD
 from mumacro.outputs.entry import Member, Output
 from mumacro.outputs.gradient import GRADIENT

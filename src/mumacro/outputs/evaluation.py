@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.answer import BAND, GROUPS, Answer
 from mumacro.errors import InputError
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.fields import BALL, Kind
 from mumacro.kernel.binding import Detail
 from mumacro.outputs import OUTPUTS
+from mumacro.outputs.answer import BAND, GROUPS, Answer
 from mumacro.outputs.deviation import STD, bent
 from mumacro.outputs.entry import Output, Values
 from mumacro.outputs.evaluated import Evaluated

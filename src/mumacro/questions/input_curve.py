@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from mumacro.answer import Answer
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.fields import AMPLITUDE, SPRING, Kind
 from mumacro.inputs.stiffening import Stiffening
 from mumacro.kernel.arrays import Array
+from mumacro.outputs.answer import Answer
 from mumacro.surrogate import Surrogate
 
 EVERYWHERE = ("v0", "y0", "omega", AMPLITUDE)  # inputs that are searched over all legal values

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from mumacro import plotting
-from mumacro.answer import BAND, Answer
 from mumacro.errors import InputError
 from mumacro.inputs.case import read, read_one
 from mumacro.inputs.cases import DEVIATIONS, fixed_inputs, named, without_interval
@@ -29,6 +28,7 @@ from mumacro.inputs.fields import (
 from mumacro.inputs.stiffening import Stiffening, stiffening_of
 from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
+from mumacro.outputs.answer import BAND, Answer
 from mumacro.outputs.evaluation import chosen
 from mumacro.questions.borders import Crossing, border_crossings
 from mumacro.questions.input_curve import InputCurve
