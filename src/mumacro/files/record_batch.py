@@ -14,7 +14,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from mumacro.errors import InputError, MumacroError
-from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, other_amplitude
 from mumacro.inputs.cells import numbers_of
@@ -29,6 +28,7 @@ from mumacro.inputs.fields import (
     kind_of,
     refusal,
 )
+from mumacro.inputs.layout import ColumnNames
 from mumacro.inputs.names import absent, find_heads, meant_by
 from mumacro.inputs.numbers import Signs
 from mumacro.inputs.units import Scale, in_si, scale_of, split_unit, too_large_in_si

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
@@ -19,7 +19,7 @@ from mumacro.files.record_batch import (
     kind_of_batch,
     names_of_columns,
 )
-from mumacro.files.sources import ParquetSource, RowBlock, TextSource, lines_of
+from mumacro.files.sources import ParquetSource, RowBlock, TextSource
 from mumacro.files.writing import OutputFormat, csv_lines, written_as
 from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import KIND
@@ -106,17 +106,9 @@ def evaluate_files(
         raise FilesError(f"{cases[0]}: {error}") from None
 
 
-class _State(NamedTuple):
-    """Hold the progress of the run after a piece: the file, all rows and the rejected ones, the
-    piece's rejects as CSV."""
-
-    file: int = 0
-    rows: int = 0
-    rejected: int = 0
-    rejects: str = ""
-
-
 class _Run:
+    """Hold what a run reads and writes, and how far it is."""
+
     def __init__(
         self,
         cases: Sequence[str | Path],
@@ -138,6 +130,7 @@ class _Run:
                 raise FilesError(
                     f"{output}: is an input, and would be overwritten; give another -o"
                 )
+        self.n_rows = self.n_rejected = 0  # so far
         self.states_at_start = [_state_of(path) for path in self.files]
         #: rows of a text are written as they were read, with the answers after them
         self.keeps_lines = input_format == output_format == "text"
@@ -176,29 +169,29 @@ class _Run:
         for path in (self.out, self.rejects):
             if path.exists() and not force:
                 raise FilesError(f"{path}: exists already; --force replaces it")
-        state, rejects = _State(), None
+        rejects = None
         with ExitStack() as files:  # the rejects are moved to their place before the output
             stream = files.enter_context(growing(self.out))
             try:
                 with self.output.writing(stream, self.schema) as write:
-                    for state, piece, share in self._new_pieces():
+                    for piece, lines, share in self._new_pieces():
                         write(piece)
-                        if state.rejected:
+                        if lines:
                             rejects = rejects or self._opened_rejects(files)
-                            rejects.write(state.rejects.encode("utf-8", "surrogateescape"))
-                        progress(share, state.rows, state.rejected)
+                            rejects.write(lines.encode("utf-8", "surrogateescape"))
+                        progress(share, self.n_rows, self.n_rejected)
             except (FilesError, pa.ArrowException):
                 self._refuse_changed()  # first, because a half-written input looks damaged
                 raise
             to_disk(stream)  # a full disk refuses this, before the rejects are in place
-        if not state.rejected:
+        if rejects is None:
             self.rejects.unlink(missing_ok=True)
         return Summary(
-            state.rows,
-            state.rows - state.rejected,
-            state.rejected,
+            self.n_rows,
+            self.n_rows - self.n_rejected,
+            self.n_rejected,
             self.out,
-            self.rejects if state.rejected else None,
+            None if rejects is None else self.rejects,
             [note.as_remark for note in self.notes],
         )
 
@@ -209,22 +202,23 @@ class _Run:
         stream.write(csv_lines([head]).encode())
         return stream
 
-    def _new_pieces(self) -> Iterator[tuple[_State, Any, float]]:
-        """Yield the pieces of the output, with the state after each and the fraction of the input
-        that was read.  The header comes first."""
-        state = _State()
+    def _new_pieces(self) -> Iterator[tuple[Any, str, float]]:
+        """Yield the pieces of the output, with the lines of rejects after each and the fraction of
+        the input that was read.  The header comes first."""
         if self.output.format == "text":
             headings = [*(self.source.schema.names if self.keeps_lines else ()), *self.schema.names]
             mark = "\ufeff" if self.source.has_mark else ""
-            yield state, self.output.pack(mark + csv_lines([headings], self.output.sep)), 0.0
-        for file in range(len(self.files)):
-            state = state._replace(file=file)
+            yield self.output.pack(mark + csv_lines([headings], self.output.sep)), "", 0.0
+        for file, path in enumerate(self.files):
+            name = [path] * (len(self.files) > 1)
             for block in self.source.blocks(file, self.columns_read):
-                state, text = self._piece(state, block)
-                yield state, text, (file + block.share) / len(self.files)
+                piece, faults = self._piece(block)
+                self.n_rows += len(block.batch)
+                self.n_rejected += len(faults)
+                rows = ([*name, block.rows.lines[i], *reason] for i, reason in faults.items())
+                yield piece, csv_lines(rows), (file + block.share) / len(self.files)
         self._refuse_changed()
-        if isinstance(self.source, TextSource):
-            self.source.describe(self.say)
+        self.source.describe(self.say)
 
     def _refuse_changed(self) -> None:
         for path, beginning in zip(self.files, self.states_at_start, strict=True):
@@ -233,36 +227,34 @@ class _Run:
                     f"{path}: changed while it was read; give the command again"
                 ) from None
 
-    def _piece(self, state: _State, block: RowBlock) -> tuple[_State, Any]:
-        """Return a block as the output has it, and the state after it."""
+    def _piece(self, block: RowBlock) -> tuple[Any, dict[int, tuple[str | None, Any, str]]]:
+        """Return a block as the output has it, and by the index of a rejected row its input, the
+        cell and the reason."""
+        rows, keeps_lines = block.rows, self.keeps_lines
         answers, rejects, inputs, notes = answer_columns(
             block.batch, self.surrogate, self.columns, block.signs
         )
         for note in notes:
             add(self.notes, note)
         faults: dict[int, tuple[str | None, Any, str]] = {
-            i: (name, block.value(i, self.columns.headings[name][0]), reason)
+            i: (name, self.source.cell(block, i, self.columns.headings[name][0]), reason)
             for i, name, reason in rejects
         }
-        faults |= {i: (None, text, reason) for i, (text, reason) in block.faults.items()}
+        faults |= {i: (None, text, reason) for i, (text, reason) in rows.faults.items()}
         copied = [
             column if column.type == field.type else pa.array(inputs[field.name])
             for field, column in zip(
-                self.schema, [] if self.keeps_lines else block.batch.columns, strict=False
+                self.schema, [] if keeps_lines else block.batch.columns, strict=False
             )
         ]
         batch = pa.RecordBatch.from_arrays([*copied, *answers], schema=self.schema)
-        lines = lines_of(block.rows, self.output.sep) if self.keeps_lines and block.rows else None
+        lines = pa.array(rows.written(self.output.sep), pa.string()) if keeps_lines else None
         if faults:
             keep = np.ones(len(batch), np.bool_)
             keep[[*faults]] = False
             batch = batch.filter(pa.array(keep))
             lines = None if lines is None else lines.filter(pa.array(keep))
-        file = [self.files[state.file]] * (len(self.files) > 1)
-        reject_lines = csv_lines([*file, block.lines[i], *reason] for i, reason in faults.items())
-        n, rejected = len(block.batch), state.rejected + len(faults)
-        text = self.output.piece(batch, lines)
-        return _State(state.file, state.rows + n, rejected, reject_lines), text
+        return self.output.piece(batch, lines), faults
 
 
 def _state_of(path: Path) -> tuple[int, ...]:

@@ -19,13 +19,13 @@ import pyarrow.dataset
 
 from mumacro.errors import TextError
 from mumacro.files.record_batch import FilesError
-from mumacro.inputs.account import NO_ROW, ColumnNames
+from mumacro.inputs.account import NO_ROW, Rows
 from mumacro.inputs.carried import units_of_fields
-from mumacro.inputs.cells import BLANKS, GAPS, joined, split_row
+from mumacro.inputs.cells import BLANKS, GAPS, split_row
 from mumacro.inputs.decoding import Piece
-from mumacro.inputs.layout import Dialect, Layout
+from mumacro.inputs.layout import ColumnNames, Dialect
 from mumacro.inputs.numbers import Signs
-from mumacro.inputs.text_tables import Rows, TextTable
+from mumacro.inputs.text_tables import TextTable
 
 #: extensions of files that can be written, and their format
 WRITTEN = {
@@ -118,21 +118,9 @@ class RowBlock(NamedTuple):
     """Hold some rows in order."""
 
     batch: pa.RecordBatch  #: the rows; nulls in a row that could not be read
+    rows: Rows  #: their lines in the file, or their numbers from 1 if it has no lines
     share: float  #: fraction of the file that is read after them
-    #: line numbers in the file, or row numbers from 1 if it has no lines
-    lines: Sequence[int]
-    #: by index: the text of a row that could not be read, and the reason
-    faults: Mapping[int, tuple[str, str]] = {}
     signs: Signs | None = None  #: the separators in numbers as text
-    rows: Rows | None = None  #: rows of a table as text, with the header of their cells
-    heads: Sequence[str] = ()
-
-    def value(self, i: int, name: str) -> str | None:
-        """Return a cell as it is in the file."""
-        if self.rows is not None:
-            return split_row(self.rows.texts[i], self.rows.sep)[self.heads.index(name)]
-        cell = self.batch.column(name)[i].as_py()
-        return None if cell is None else str(cell)
 
 
 class ParquetSource:
@@ -168,9 +156,18 @@ class ParquetSource:
             for batch in part.to_batches(self.schema, columns=names, **options):
                 numbers = range(row + 1, row + 1 + len(batch))
                 row += len(batch)
-                yield RowBlock(batch, row / max(part.metadata.num_rows, 1), numbers)
+                share = row / max(part.metadata.num_rows, 1)
+                yield RowBlock(batch, Rows("", [], numbers, {}, []), share)
         except (pa.ArrowException, OSError) as error:
             raise FilesError(f"{part.path}: damaged after row {row} ({error})") from None
+
+    def cell(self, block: RowBlock, i: int, name: str) -> str | None:
+        """Return a cell of a row as text."""
+        cell = block.batch.column(name)[i].as_py()
+        return None if cell is None else str(cell)
+
+    def describe(self, say: Callable[[str], None]) -> None:
+        """Say nothing: Parquet is read in one way."""
 
 
 class TextSource:
@@ -188,28 +185,22 @@ class TextSource:
             except TextError as error:
                 raise FilesError(f"{path}: {error}") from None
             self.tables.append(table)
-            if table.layout.heads != self.layout.heads:
+            heads, decimal = table.account.units.heads, table.signs.decimal
+            if len(self.tables) == 1:
+                self.heads, self.decimal = heads, decimal or "."
+            if heads != self.heads:
                 raise FilesError(f"{path}: its header differs from that of {files[0]}")
-            if to_text and table.signs.decimal not in ("", self.decimal):
+            if to_text and decimal not in ("", self.decimal):
                 raise FilesError(
                     f"{path}: its decimal separator differs from that of {files[0]}; give the "
                     "files one by one, or write Parquet"
                 )
+        account = self.tables[0].account
         # Excel reads UTF-8 correctly if it begins with a byte-order mark
-        self.has_mark = self.layout.encoding != "utf-8"
-        self.where = f"{files[0]}: line {self.layout.line}: "
-        self.sep = self.tables[0].account.sep
-        self.schema = pa.schema([(head, pa.string()) for head in self.layout.heads])
-
-    @property
-    def layout(self) -> Layout:
-        """Return how the first table is written."""
-        return self.tables[0].layout
-
-    @property
-    def decimal(self) -> str:
-        """Return the decimal separator of the first table."""
-        return self.tables[0].signs.decimal or "."
+        self.has_mark = account.encoding != "utf-8"
+        self.where = f"{files[0]}: line {account.header.start + 1}: "
+        self.sep = account.sep
+        self.schema = pa.schema([(head, pa.string()) for head in self.heads])
 
     def describe(self, say: Callable[[str], None]) -> None:
         """Say how the files were read (once if all are alike), and what was left out."""
@@ -220,26 +211,21 @@ class TextSource:
             where = "" if len(names) == len(self.tables) else f"{', '.join(names[:3])} "
             say(f"{where}read as: {form}")
 
+    def cell(self, block: RowBlock, i: int, name: str) -> str | None:
+        """Return a cell of a row as it is in the file."""
+        return split_row(block.rows.texts[i], block.rows.sep)[self.heads.index(name)]
+
     def blocks(self, file: int, names: Sequence[str]) -> Iterator[RowBlock]:
         """Yield the rows of a file in blocks, with the columns ``names``.  An input is a column of
         numbers if all its cells in the block are plain numbers."""
-        path, table = self.files[file], self.tables[file]
-        size, place = max(path.stat().st_size, 1), 0
-
-        def report_place(byte: int) -> None:
-            nonlocal place
-            place = byte
-
+        table, places = self.tables[file], [self.heads.index(name) for name in names]
         try:
-            for piece in table.pieces(report_place):
+            for piece in table.pieces():
                 rows, columns = _plain_rows(piece, table) or _rows_one_by_one(piece, table)
-                heads = table.layout.heads
-                arrays = [columns[heads.index(name)] for name in names]
-                batch = pa.RecordBatch.from_arrays(arrays, [*names])
-                share = place / size
-                yield RowBlock(batch, share, rows.lines, rows.faults, table.signs, rows, heads)
+                batch = pa.RecordBatch.from_arrays([columns[i] for i in places], [*names])
+                yield RowBlock(batch, rows, piece.share, table.signs)
         except TextError as error:
-            raise FilesError(f"{path}: {error}") from None
+            raise FilesError(f"{self.files[file]}: {error}") from None
 
 
 def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] | None:
@@ -247,26 +233,27 @@ def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] |
     each input is a number or a gap, and no line may begin like a comment or a row of statistics.
     Return None if the lines must be examined one by one."""
     account, text, sep = table.account, piece.text, table.account.sep
+    inputs = account.units.inputs
     shows_signs = "." in text or ('"' if sep == "," else ",") in text
     if (
-        table.layout.sep == BLANKS
-        or not table.layout.inputs
-        or table.open_row
+        account.header.sep == BLANKS
+        or not inputs
+        or account.open
         or account.name in text
         or (shows_signs and not table.signs.decimal)
         or ('"' in text and not _quotes_surround_cells(text, sep))
     ):
         return None
     try:
-        columns = _read(text, table, table.layout.inputs)
+        columns = _read(text, table, inputs)
     except pa.ArrowInvalid:
         return None
     lines = piece.lines
-    numbers = [columns[i] for i in table.layout.inputs]
+    numbers = [columns[i] for i in inputs]
     # a line begins with a text before the first column in which every line has a number
-    full = (i for i in sorted(table.layout.inputs) if not columns[i].null_count)
+    full = (i for i in sorted(inputs) if not columns[i].null_count)
     begins = columns[: next(full, None)]
-    texts = [column for i, column in enumerate(begins) if i not in table.layout.inputs]
+    texts = [column for i, column in enumerate(begins) if i not in inputs]
     has_number = functools.reduce(pc.or_, map(pc.is_valid, numbers))
     if (
         len(has_number) != len(lines)
@@ -276,18 +263,17 @@ def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] |
     ):
         return None
     account.units.rows_begun = True
-    return Rows(sep, lines, range(piece.first, piece.first + len(lines)), {}), columns
+    return Rows(sep, lines, range(piece.first, piece.first + len(lines)), {}, []), columns
 
 
 def _rows_one_by_one(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]]:
     """Return the rows in some lines, and their columns: inputs as numbers, or all as text if a cell
     is not a plain number."""
-    rows = table.rows_in(piece)
+    rows, inputs = table.account.rows_in(piece), table.account.units.inputs
     table.see_signs(rows)
-    text, inputs = "\n".join(rows.texts), table.layout.inputs
     if not rows.texts:
-        types = _types(table, inputs)
-        return rows, [pa.array([], arrow_type) for arrow_type in types.values()]
+        return rows, [pa.array([], kind) for kind in _types(table, inputs).values()]
+    text = "\n".join(rows.texts)
     with suppress(pa.ArrowInvalid):
         columns = _read(text, table, inputs)
         if not _has_infinity([columns[i] for i in inputs]):
@@ -344,10 +330,3 @@ def _read(text: str, table: TextTable, numbers: Container[int]) -> list[pa.Array
         ),
     )
     return [column.combine_chunks() for column in read.columns]
-
-
-def lines_of(rows: Rows, sep: str) -> pa.Array:
-    """Return rows as they are in the file, as an array of texts.  With another separator, put cells
-    in quotes where they need it."""
-    texts = rows.texts if sep == rows.sep else [joined(cells, sep) for cells in rows.cells()]
-    return pa.array(texts, pa.string())

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.cases import check, columns_of, library_of, no_such_input, select
 from mumacro.inputs.columns import to_si
 from mumacro.inputs.doubts import UNITS, remarks
 from mumacro.inputs.fields import AMPLITUDE, MEASURED_AS, NAMES, kind_of
-from mumacro.inputs.layout import Dialect
+from mumacro.inputs.layout import ColumnNames, Dialect
 from mumacro.inputs.names import unknown_name
 from mumacro.inputs.text_tables import Most, TableOfNumbers, read_numbers
 from mumacro.inputs.units import split_unit

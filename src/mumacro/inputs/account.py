@@ -1,12 +1,14 @@
-"""Decide for each line of a table what it is.
+"""Say for each line of a table what it is, and cut out the rows.
 
 A line is before the header, the header, units, data, a comment, a ruler or empty.  Any other line
 (another header, another segment, a row of statistics) is refused with its number and with the
 option that leaves it out.
 """
 
+import csv
+import enum
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from mumacro.errors import TextError
@@ -22,11 +24,9 @@ from mumacro.inputs.cells import (
     uncommented,
 )
 from mumacro.inputs.column_units import ColumnUnits
-from mumacro.inputs.names import heading
-from mumacro.inputs.units import split_unit
+from mumacro.inputs.decoding import LONGEST, Piece
+from mumacro.inputs.layout import END_OF_HEADER, ColumnNames, Dialect, find_header, whole
 
-#: what LabVIEW writes after each of its headers
-END_OF_HEADER = "***End_of_Header***"
 # first words of a row of statistics, in lower case
 _STATISTICS = re.compile(
     r"(?:mean|average|avg|median|mittel(?:wert)?|mw|moyenne|min(?:imum)?|max(?:imum)?|sum|total"
@@ -40,129 +40,254 @@ NO_ROW = rf"^\s*(?:{'|'.join(map(re.escape, COMMENT))}|{_STATISTICS.pattern}$)"
 _DIGITS = frozenset("0123456789")
 # a line drawn between rows has only these characters, some of them together
 _OF_RULER, _RULER = "-=_+|: \t,;", re.compile(r"-{4}|={3}|\+-{2}|\|:?-{3}")
+_ABOVE = 4  # units may be within this number of lines above the names
+_EXCERPT = 500  # characters that are kept of a refused row
+_BETWEEN_BLANKS = re.compile(r'"[^"]*"|\S+')
+# by the separator: a quoted cell after blanks, any quoted cell, and a quote that begins a cell
+_BEHIND_BLANKS, _QUOTED, _OPEN_QUOTE = (
+    {sep: re.compile(pattern.replace("SEP", re.escape(sep))) for sep in ",;|\t"}
+    for pattern in (
+        r'(?<![^SEP\n]) ++("(?:[^"]++|"")*+"(?=SEP|\n|\Z))',
+        r'"(?<![^SEP\n]")(?:[^"]++|"")*+"(?=SEP|\n|\Z)',
+        r'(?<![^SEP\n]) *+"',
+    )
+)
+_CLOSING = re.compile(r'(?:[^"]++|"")*+"')  # the rest of a quoted cell
+_UNCLOSED = re.compile(r' *+"(?:[^"]++|"")*+\Z')
 
 
-class ColumnNames(NamedTuple):
-    """Name the columns of a table that have a meaning."""
+class Line(enum.Enum):
+    """Name what a line after the header may be."""
 
-    input_of: Mapping[str, str]  #: by name: the input whose units the column has
-    #: of each of these lists, one name must be in the table
-    required_groups: Sequence[Sequence[str]]
-
-    def are_all_in(self, heads: Sequence[str]) -> bool:
-        """Return whether the headers contain all necessary names."""
-        names = {split_unit(head)[0] for head in heads}
-        return all(names.intersection(group) for group in self.required_groups)
-
-    def may_be_in(self, text: str) -> bool:
-        """Return whether a text contains all necessary names, as words or within other words."""
-        return all(any(name in text for name in names) for names in self.required_groups)
+    ROW, EMPTY, LEFT_OUT, HEADER_AGAIN = range(4)
 
 
-class Header(NamedTuple):
-    """Hold the line with the names of the columns."""
+class Rows(NamedTuple):
+    """Hold rows of a table in order, as text: each has as many cells as the header."""
 
-    start: int  #: its line, from 0
-    end: int  #: the next line after it
     sep: str
-    cells: list[str]
+    texts: list[str]
+    lines: Sequence[int]  #: the line of the file in which each row begins
+    #: by the index of a row: its text, and why it does not belong to this table; its cells are
+    #: empty
+    faults: dict[int, tuple[str, str]]
+    skipped: list[int]  #: lines between them that are neither rows nor empty
+
+    def cells(self) -> Iterator[list[str]]:
+        """Yield the cells of each row."""
+        for line, text in zip(self.lines, self.texts, strict=True):
+            try:
+                yield split_row(text, self.sep)
+            except csv.Error as error:
+                raise TextError(f"line {line}: {error}") from None
+
+    def written(self, sep: str) -> list[str]:
+        """Return the rows as they are in the file.  With another separator, put cells in quotes
+        where they need it."""
+        return self.texts if sep == self.sep else [joined(cells, sep) for cells in self.cells()]
 
 
 class Account:
-    """Decide what each line after the header is."""
+    """Hold how a table is written, from its first lines, and say what each of its lines is.
+
+    After the header come units and comments; then the rows begin.  Raise TextError if there is no
+    line at all, if units belong to no column or contradict each other, or if there are rows before
+    the header.
+    """
 
     def __init__(
-        self,
-        header: Header,
-        units: ColumnUnits,
-        column_names: ColumnNames,
-        dashes: str = "--",
-        labview: bool = False,
-        first: int | None = None,
+        self, lines: list[str], column_names: ColumnNames, dialect: Dialect, encoding: str = ""
     ) -> None:
-        self.header, self.units, self._column_names = header, units, column_names
-        self._dashes, self._labview = dashes, labview
-        self.width = len(units.names)
+        self.encoding = encoding
+        self.dialect = dialect.completed(lines)
+        self.header = header = find_header(lines, column_names, self.dialect)
+        while header.cells and not header.cells[-1]:
+            header.cells.pop()
+        self.units = ColumnUnits(header.cells, header.sep, column_names.input_of)
+        self.has_names = column_names.are_all_in(self.units.names)
+        self.width = len(self.units.names)
         #: separator of the cells in rows, after blanks were replaced by tabs
         self.sep = "\t" if header.sep == BLANKS else header.sep
+        self._column_names, self._dashes = column_names, dialect.dashes
         # rows of LabVIEW may end before the last column
-        self.may_lack_last = labview and units.names[-1:] == ["Comment"]
-        self.first = first  #: the line of the first row, when it is known
+        self._may_lack_last = self.dialect.labview and self.units.names[-1:] == ["Comment"]
         # every header has this name; most lines do not, so it is searched first
         groups = column_names.required_groups
         self.name = max((names[0] for names in groups if len(names) == 1), key=len, default="")
-        self.repeated: list[int] = []  #: lines that repeat the header or its units
-        self.skipped: list[int] = []  #: repeated lines, comments and rulers
+        self.repeated = set[int]()  #: lines that repeat the header or its units
+        self.open = list[str]()  #: the lines so far of a row that goes on
+        self.begun = 0  #: the line in which it begins
+        if self.dialect.units is not None:
+            cells = split_header(lines[self.dialect.units], header.sep)
+            self.units.take_cells(self.dialect.units + 1, ["", *cells[1:]])
+        elif self.has_names:
+            self._take_above(lines[: header.start])
+        self.first = 0  #: the first line that may be data; 0 while it is searched
+        self.first = self._first_row(lines)
+        self.last = dialect.rows[1] if dialect.rows else None  #: the last, if a person names it
+        #: lines before the data that are not empty, not the header and not units
+        self.skipped = [
+            i
+            for i, line in enumerate(lines[: self.first - 1], 1)
+            if line.strip() and i not in self.units.lines and not header.start < i <= header.end
+        ]
 
-    def remedy(self, line: int) -> str:
-        """Return the remedy for a line that does not belong to the rows."""
-        if not self._dashes:
-            return "give the rows alone"
-        if self.first is not None and line > self.first:
-            return f"{self._dashes}rows {self.first}..{line - 1} reads those before it"
-        return f"{self._dashes}rows A..B says which lines are data"
+    def _take_above(self, lines: Sequence[str]) -> None:
+        """Take the units above the header: a row close to it, legends, and comments of ECSV."""
+        units = self.units
+        above = [i for i in reversed(range(self.dialect.skip, len(lines))) if lines[i].strip()]
+        row = next((i for i in above[:_ABOVE] if units.take_row(i + 1, lines[i])), None)
+        if any("%ECSV" in lines[i][:20] for i in above):
+            units.take_ecsv(lines)
+            return
+        for i in reversed(above):
+            if i != row:
+                units.take_legend(i + 1, lines[i])
 
-    def row(self, line: int, text: str) -> tuple[str, str | None] | None:
-        """Return the text of a row, with as many cells as the header, and its fault.  Return None
-        if the line is not a row."""
+    def _first_row(self, lines: Sequence[str]) -> int:
+        """Return the line of the first row, after the units and comments below the header."""
+        rows, end = self.dialect.rows, self.header.end
+        if not self.has_names:
+            return rows[0] if rows else end + 1
+        if rows:
+            for i in range(end, min(rows[0] - 1, len(lines))):
+                self.units.take(i + 1, lines[i])
+            return max(rows[0], end + 1)
+        for i in range(end, len(lines)):
+            text = lines[i] if is_comment(lines[i]) else whole(lines, i)[0]
+            if self._what(i + 1, text) is Line.ROW:
+                return i + 1
+        return max(len(lines), end) + 1
+
+    # --- rows -------------------------------------------------------------------------------------
+
+    def rows_in(self, piece: Piece) -> Rows:
+        """Return the rows in some lines, each of which is accounted for."""
+        lines = list[int]()
+        rows = Rows(self.sep, [], lines, {}, [])
+        for number, line in enumerate(piece.lines, piece.first):
+            if self.header.sep == BLANKS:
+                cells = _BETWEEN_BLANKS.findall(line) if '"' in line else line.split()
+                line = self.sep.join(cells)
+            self.begun = self.begun if self.open else number
+            text = self._whole_row(line) if self.open or '"' in line else line
+            if text is None:
+                continue
+            what, row, fault = self._row(self.begun, text)
+            if what is Line.ROW:
+                if fault is not None:
+                    excerpt = text if len(text) <= _EXCERPT else f"{text[:_EXCERPT]}…"
+                    rows.faults[len(rows.texts)] = excerpt, fault
+                rows.texts.append(row)
+                lines.append(self.begun)
+            elif what is not Line.EMPTY:
+                rows.skipped.append(self.begun)
+        if sum(map(len, self.open)) > LONGEST:
+            raise unclosed(self.begun)
+        return rows
+
+    def _whole_row(self, line: str) -> str | None:
+        """Return the row that ends with a line with quotes, or None if it goes on, because a quoted
+        cell has a line end.  Raise TextError if a quote is not at the end of its cell."""
+        sep, end = self.sep, 0
+        if self.open:
+            closing = _CLOSING.match(line)
+            if closing is None:
+                self.open.append(line)
+                return None
+            end = closing.end()
+        elif is_comment(line) and not self._has_name(line):
+            return line
+        rest = line[end:]
+        rest = _BEHIND_BLANKS[sep].sub(r"\1", rest) if ' "' in rest else rest
+        bare = _QUOTED[sep].sub(lambda match: "0" * len(match[0]), rest)
+        quote = _OPEN_QUOTE[sep].search(bare)
+        if (end and rest and rest[0] != sep) or (
+            quote and not _UNCLOSED.match(rest, quote.start())
+        ):
+            raise unclosed(self.begun)
+        if quote:
+            self.open.append(line[:end] + rest)
+            return None
+        row = "\n".join([*self.open, line[:end] + rest])
+        self.open = []
+        return row
+
+    def _row(self, line: int, text: str) -> tuple[Line, str, str | None]:
+        """Return what a line is, and for a row its text with as many cells as the header, and its
+        fault."""
         width, empty = self.width, self.sep * (self.width - 1)
         if self._is_plain(text):
-            return text, None
+            return Line.ROW, text, None
         if text.count(self.sep) > 2 * width + 1000 and not is_comment(text):  # too long to be split
-            return empty, irregular(text.count(self.sep) + 1, width)
-        if not self.is_row(line, text):
-            return None
+            return Line.ROW, empty, _irregular(text.count(self.sep) + 1, width)
+        what = self._what(line, text)
+        if what is not Line.ROW:
+            return what, text, None
         cells = split_row(text, self.sep)
         if len(cells) == width:
-            return text, None
+            return what, text, None
         if len(cells) > width and not any(map(str.strip, cells[width:])):
-            return joined(cells[:width], self.sep), None
-        if len(cells) == width - 1 and self.may_lack_last:
-            return text + self.sep, None
-        return empty, irregular(len(cells), width)
+            return what, joined(cells[:width], self.sep), None
+        if len(cells) == width - 1 and self._may_lack_last:
+            return what, text + self.sep, None
+        return what, empty, _irregular(len(cells), width)
 
     def _is_plain(self, text: str) -> bool:
-        """Return whether a line needs no closer look, as most rows do: after the first row, all
-        inputs begin like numbers, and so does the first cell."""
-        if self.first is None or 0 not in self.units.inputs or '"' in text:
+        """Return whether a line needs no closer look, as most rows do: all inputs begin like
+        numbers, and so does the first cell."""
+        if 0 not in self.units.inputs or '"' in text:
             return False
         cells = text.split(self.sep, self.width)
         return len(cells) == self.width and all(
             cells[i].lstrip("+-.")[:1] in _DIGITS for i in self.units.inputs
         )
 
-    def is_row(self, line: int, text: str) -> bool:
-        """Return whether a line is a row.  Raise TextError if it has no meaning at all."""
+    # --- other lines ------------------------------------------------------------------------------
+
+    def remedy(self, line: int) -> str:
+        """Return the remedy for a line that does not belong to the rows."""
+        if not self._dashes:
+            return "give the rows alone"
+        if self.first and line > self.first:
+            return f"{self._dashes}rows {self.first}..{line - 1} reads those before it"
+        return f"{self._dashes}rows A..B says which lines are data"
+
+    def _what(self, line: int, text: str) -> Line:
+        """Return what a line is.  Raise TextError if it has no meaning at all."""
         if not text.strip(f" \t{self.header.sep}"):
-            return False
+            return Line.EMPTY
         if self._may_be_header(text) and self._repeats_header(line, text):
-            return self._skip(line, again=True)
-        if is_comment(text) and not (self.has_name(text) and len(self._cells(text)) == self.width):
+            return self._again(line)
+        if is_comment(text) and not (self._has_name(text) and len(self._cells(text)) == self.width):
             if "\n" in text:
                 raise TextError(f"line {line}: a quote in a comment is not closed: leave it out")
             self.units.take(line, text, self._remedy_of_units(line))
-            return self._skip(line)
+            return Line.LEFT_OUT
         if not text.strip(_OF_RULER) and _RULER.search(text):
-            return self._skip(line)
+            return Line.LEFT_OUT
         cells = [cell.strip() for cell in self._cells(text)]
         first = next((cell for cell in cells if cell), "")
         if not first:  # a blank line whose cells are in quotes
-            return False
+            return Line.EMPTY
         if names_statistics(first):
             what = f"{first!r} begins a row of statistics"
             raise TextError(f"line {line}: {what}: {self.remedy(line)}")
         filled = [cells[i] for i in self.units.inputs if i < len(cells) and cells[i]]
         may_be_units = all(not starts_as_number(cell) or cell == "1" for cell in filled)
         if may_be_units and self.units.take_row(line, text, self._remedy_of_units(line), True):
-            return self._skip(line, again=self.first is not None)
+            return self._again(line) if self.first else Line.LEFT_OUT
         if not self._holds_values(cells, filled):
             shown = " ".join(text.split())[:60]
             remedy = self.remedy(line)
             raise TextError(f"line {line}: {shown!r} is neither a row nor a comment: {remedy}")
-        if self.first is None:
-            self.first = line
         self.units.rows_begun = True
-        return True
+        return Line.ROW
+
+    def _again(self, line: int) -> Line:
+        """Account for a line that repeats the header or its units."""
+        self.repeated.add(line)
+        return Line.HEADER_AGAIN
 
     def _holds_values(self, cells: Sequence[str], filled: Sequence[str]) -> bool:
         """Return whether some of the ``filled`` cells of inputs may be a value.  A row without any
@@ -172,31 +297,24 @@ class Account:
         texts = [*filter(None, cells)]
         return may_be_value(texts[0]) or (len(cells) == self.width and len(texts) > 1)
 
-    def _skip(self, line: int, again: bool = False) -> bool:
-        """Account for a line that is not a row."""
-        self.skipped.append(line)
-        if again:
-            self.repeated.append(line)
-        return False
-
     def _cells(self, text: str) -> list[str]:
         """Return the cells of a line, which may still have blanks between them."""
         if self.header.sep == BLANKS and self.sep not in text:
             return split_header(text, BLANKS)
         return split_row(text, self.sep)
 
-    def has_name(self, text: str) -> bool:
+    def _has_name(self, text: str) -> bool:
         """Return whether a line that begins like a comment may be a row whose first cell is a name
         such as #1."""
         return 0 not in self.units.inputs and any(map(starts_as_number, self._cells(text)[1:]))
 
     def _remedy_of_units(self, line: int) -> str:
-        return "leave one of them out" if self.first is None else self.remedy(line)
+        return "leave one of them out" if not self.first else self.remedy(line)
 
     def _may_be_header(self, text: str) -> bool:
         """Return whether a text has all names that a header needs, or begins a new segment of
         LabVIEW."""
-        if self._labview and END_OF_HEADER in text:
+        if self.dialect.labview and END_OF_HEADER in text:
             return True
         return self.name in text and self._column_names.may_be_in(text)
 
@@ -209,10 +327,10 @@ class Account:
         cells = split_header(uncommented(text), header.sep)
         if cells[: len(header.cells)] == header.cells:
             return True
-        heads = [heading(cell, self._column_names.input_of) for cell in cells]
-        if not self._column_names.are_all_in(heads):
+        columns = self._column_names.split(cells)
+        if not self._column_names.are_all_in(name for name, _ in columns):
             return False
-        columns = [split_unit(head) for head in heads[: self.width]]
+        columns = columns[: self.width]
         if [name for name, _ in columns] == units.names and all(
             units.agrees(i, columns[i][1]) for i in units.inputs
         ):
@@ -230,7 +348,12 @@ def names_statistics(text: str) -> bool:
     return len(text) < 40 and _STATISTICS.fullmatch(text.lower()) is not None
 
 
-def irregular(count: int, width: int) -> str:
+def _irregular(count: int, width: int) -> str:
     """Return what is wrong with a row that has this number of cells."""
     cells = "cell" if count == 1 else "cells"
     return f"has {count:,} {cells}, the header has {width:,}"
+
+
+def unclosed(line: int) -> TextError:
+    """Return the error for a row with a quote that does not end its cell."""
+    return TextError(f"line {line}: a quote is not closed, or not at the end of its cell")

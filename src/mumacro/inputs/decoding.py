@@ -12,7 +12,7 @@ import gzip
 import io
 import re
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -60,11 +60,30 @@ class Piece(NamedTuple):
 
     first: int  #: the number of the first line, from 1
     text: str  #: the lines, with a line feed between two of them
+    share: float = 1.0  #: fraction of the file that is read after them
 
     @property
     def lines(self) -> list[str]:
         """Return the lines without their ends."""
         return self.text.split("\n")
+
+    def between(self, first: int, last: int | None) -> "Piece | None":
+        """Return the lines from ``first`` to ``last``, or None if there are none."""
+        start, text, share = self
+        if start < first:
+            lines = text.split("\n", first - start)
+            if len(lines) <= first - start:
+                return None
+            start, text = first, lines[-1]
+        if last is not None:
+            text = "\n".join(text.split("\n", last - start + 1)[: max(last - start + 1, 0)])
+        return Piece(start, text, share) if last is None or start <= last else None
+
+    def parts(self, count: int) -> "Iterator[Piece]":
+        """Yield the lines in pieces of up to ``count`` lines."""
+        lines = self.lines
+        for i in range(0, len(lines), count):
+            yield Piece(self.first + i, "\n".join(lines[i : i + count]), self.share)
 
 
 def encoding_of(name: str) -> str:
@@ -85,66 +104,61 @@ def encoding_of(name: str) -> str:
     return codec
 
 
-def file_pieces(
-    path: Path, report_place: Callable[[int], None] = lambda _place: None
-) -> Iterator[bytes]:
-    """Yield the bytes of a file in pieces, also of a compressed file (.gz).  Tell ``report_place``
-    how far the file has been read.  Raise TextError if a compressed file is damaged."""
+def byte_pieces(source: Path | bytes) -> Iterator[tuple[bytes, float]]:
+    """Yield the bytes of a file in pieces, also of a compressed file (.gz), each with the fraction
+    of the file that is read after it.  Raise TextError if a compressed file is damaged."""
+    if isinstance(source, bytes):
+        yield source, 1.0
+        return
+    size, most = max(source.stat().st_size, 1), max(PIECE, _START)
     try:
-        with path.open("rb") as raw:
-            stream: Any = gzip.GzipFile(fileobj=raw) if path.name.lower().endswith(".gz") else raw
-            while data := stream.read(PIECE):
-                report_place(raw.tell())
-                yield data
+        with source.open("rb") as raw:
+            stream: Any = gzip.GzipFile(fileobj=raw) if source.name.lower().endswith(".gz") else raw
+            while data := stream.read(most):
+                yield data, raw.tell() / size
+                most = PIECE
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise TextError(f"the compressed file is damaged ({error})") from None
 
 
 class Text:
-    """Split pieces of bytes into pieces of complete lines.
+    """Split pieces of bytes into pieces of complete lines.  The first piece must show the encoding:
+    it has 1 kB, or all bytes.
 
     Memory holds a piece and a line.  TextError names the line with bytes that are not text in the
     encoding, with a zero byte, or with too many characters.
 
-    >>> [piece.lines for piece in Text([b"a\\rb\\r", b"\\nc"])]
-    [['a', 'b'], ['c']]
+    >>> [piece.lines for piece in Text([(b"a\\rb\\r", 0.5), (b"\\nc", 1.0)]).pieces()]
+    [['a'], ['b'], ['c']]
     """
 
-    def __init__(self, pieces: Iterable[bytes], encoding: str | None = None) -> None:
+    def __init__(self, pieces: Iterable[tuple[bytes, float]], encoding: str | None = None) -> None:
         self._codec_of_caller = None if encoding is None else encoding_of(encoding)
         self.encoding = ""  #: Python's name, known after the first piece
-        self._bytes = _with_start(pieces)
+        self._bytes = pieces
         self._lines = 0  # number of complete lines
-        self._begun: list[str] = []  # the beginning of the next line
         self._ascii = True  # whether all bytes so far are ASCII
         self._decoder: codecs.IncrementalDecoder | None = None
         self._line_ends = io.IncrementalNewlineDecoder(None, translate=True)
 
-    def __iter__(self) -> Iterator[Piece]:
-        return self
-
-    def __next__(self) -> Piece:
-        for data in filter(None, self._bytes):
+    def pieces(self) -> Iterator[Piece]:
+        """Yield the lines in pieces."""
+        begun = list[str]()  # the beginning of the next line
+        for data, share in self._bytes:
             text = self._decoded(data)
             whole, end, rest = text.rpartition("\n")
-            piece = self._piece("".join([*self._begun, whole])) if end else None
-            self._begun = [rest] if end else [*self._begun, rest]
-            if sum(map(len, self._begun)) > LONGEST:
+            piece = Piece(self._lines + 1, "".join([*begun, whole]), share) if end else None
+            if piece is not None:
+                self._lines += text.count("\n")
+            begun = [rest] if end else [*begun, rest]
+            if sum(map(len, begun)) > LONGEST:
                 where = f"line {self._lines + 1} has more than {LONGEST >> 20} MiB"
                 raise TextError(f"{where}: it is no table, or its line ends are lost")
             if piece is not None:
-                return piece
-        last = "".join(self._begun) + (self._decoded(b"", final=True) if self._decoder else "")
-        self._begun, self._decoder = [], None
-        if not last:
-            raise StopIteration
-        return self._piece(last.removesuffix("\n"))
-
-    def _piece(self, text: str) -> Piece:
-        """Return the next complete lines."""
-        first = self._lines + 1
-        self._lines += text.count("\n") + 1
-        return Piece(first, text)
+                yield piece
+        last = "".join(begun) + (self._decoded(b"", final=True) if self._decoder else "")
+        if last:
+            yield Piece(self._lines + 1, last.removesuffix("\n"))
 
     def _decoded(self, data: bytes, final: bool = False) -> str:
         """Return the text of some bytes, with line feeds as line ends."""
@@ -154,6 +168,10 @@ class Text:
             text = self._decoder.decode(data, final)
         except UnicodeDecodeError as error:
             text = self._in_windows_1252(error, final)
+        except UnicodeError:  # of UTF-16 and UTF-32, which a caller has named
+            name = NAMES.get(self.encoding, self.encoding)
+            remedy = f"give {self.encoding}-le or {self.encoding}-be, or another encoding"
+            raise TextError(f"it does not begin like {name}: {remedy}") from None
         self._ascii = self._ascii and text.isascii()
         text = self._line_ends.decode(text, final)
         if "\0" in text:
@@ -197,17 +215,6 @@ class Text:
         byte = f"byte 0x{data[error.start]:02x} in line {self._lines + 1 + ends}"
         name = NAMES.get(self.encoding, self.encoding)
         raise TextError(f"{byte} is not {name}: save the file as UTF-8, or give its encoding")
-
-
-def _with_start(pieces: Iterable[bytes]) -> Iterator[bytes]:
-    """Yield the pieces; make the first one long enough to show the encoding."""
-    start = b""
-    for piece in (rest := iter(pieces)):
-        start += piece
-        if len(start) >= _START:
-            break
-    yield start
-    yield from rest
 
 
 def _of_zeros(data: bytes) -> str | None:

@@ -1,16 +1,15 @@
-"""Find how a table as text is written, once, from its first lines, for all functions that read it.
+"""Find the header of a table as text, once, from its first lines, for all functions that read it.
 
-:func:`find_layout` finds the header (the first line with all necessary names), then the units of
-its columns (:mod:`mumacro.inputs.column_units`) and the first row (:mod:`mumacro.inputs.account`).
+The header is the first line with all necessary names.  :class:`mumacro.inputs.account.Account` says
+what the lines after it are.
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import NamedTuple
 
 from mumacro.errors import TextError
-from mumacro.inputs.account import END_OF_HEADER, Account, ColumnNames, Header
 from mumacro.inputs.cells import (
     BLANKS,
     MOST_COLUMNS,
@@ -19,23 +18,21 @@ from mumacro.inputs.cells import (
     starts_as_number,
     uncommented,
 )
-from mumacro.inputs.column_units import ColumnUnits
-from mumacro.inputs.decoding import NAMES
 from mumacro.inputs.names import heading, meant_by
-from mumacro.inputs.numbers import Signs
+from mumacro.inputs.units import split_unit
 
 #: separators of the cells, by the name in an option
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t", "blanks": BLANKS}
-_WORDS = {",": "comma", ";": "semicolon", "|": "bar", "\t": "tab", BLANKS: "blanks"}
-_WORDS_OF_SIGNS = {".": "point", ",": "comma"}
 LOOKED_AT = 2_000  #: the header must be within this number of lines
-_ABOVE = 4  # units may be within this number of lines above the names
+#: what LabVIEW writes after each of its headers
+END_OF_HEADER = "***End_of_Header***"
 _SEP_LINE = re.compile(r'\ufeff?"?sep=([,;|\t])"?', re.IGNORECASE)
 _LABEL = re.compile(r"[^\W\d]\w{0,19}:\s+")  # before the names in a comment
 
 
 class Dialect(NamedTuple):
-    """Hold what a person says about the layout of a table; None means that it is to be found."""
+    """Hold what is known about the layout of a table before its header is found: what a person
+    says, and then what the table says about itself.  None means that it is to be found."""
 
     sep: str | None = None  #: a character, or :data:`BLANKS`
     decimal: str | None = None
@@ -45,196 +42,72 @@ class Dialect(NamedTuple):
     dashes: str = "--"  #: text before the name of an option, in messages
     rows: tuple[int, int] | None = None  #: the first and the last line of data
     sheet: str | None = None  #: sheet of a workbook
+    labview: bool = False  #: whether LabVIEW wrote the table
+    units: int | None = None  #: index of a line of LabVIEW with the units of the columns
 
-    def signs(self, layout: "Layout") -> Signs:
-        """Return what is known about the separators in the numbers of a table."""
-        return Signs(self.decimal or layout.decimal, self.thousands, layout.sep, self.dashes)
-
-
-class _Declared(NamedTuple):
-    """Hold what the lines before the header say about the table."""
-
-    sep: str | None = None
-    decimal: str | None = None
-    labview: bool = False
-    units: int | None = None  # index of a line of LabVIEW with the units of the columns
-
-
-class Layout(NamedTuple):
-    """Hold how a table is written."""
-
-    encoding: str
-    header: Header
-    units: ColumnUnits
-    declared: _Declared
-    first: int  #: the first line that may be data
-    last: int | None  #: the last line of data, if a person names it
-    skipped: list[int]  #: lines before the data that are not empty, not the header and not units
-    repeated: list[int]  #: those of them that repeat the header
-
-    @property
-    def line(self) -> int:
-        """Return the line of the header."""
-        return self.header.start + 1
-
-    @property
-    def heads(self) -> list[str]:
-        """Return the names of the columns, with their units in brackets."""
-        return self.units.heads
-
-    @property
-    def inputs(self) -> dict[int, str]:
-        """Return the columns that have a meaning, by their index."""
-        return self.units.inputs
-
-    @property
-    def sep(self) -> str:
-        """Return the separator of the cells; :data:`BLANKS` means any number of blanks."""
-        return self.header.sep
-
-    @property
-    def decimal(self) -> str | None:
-        """Return the decimal separator, if the table itself says it."""
-        return self.declared.decimal
-
-    def account(self, column_names: ColumnNames, dialect: Dialect) -> Account:
-        """Return an account of the lines from the first row on."""
-        account = Account(
-            self.header,
-            self.units,
-            column_names,
-            dialect.dashes,
-            self.declared.labview,
-            self.first,
-        )
-        account.repeated += self.repeated
-        return account
-
-    def described(self, signs: Signs) -> str:
-        """Return in a few words how the table is read, with the unit of each input.
-
-        >>> column_names = ColumnNames({"v0": "v0", "mu_macro": "mu0"}, [["v0"], ["mu_macro"]])
-        >>> lines = ["run 7", "v0;mu_macro", "mm/s;%", "1,5;7"]
-        >>> layout = find_layout(lines, column_names, Dialect())
-        >>> layout.described(Signs(",", None))
-        'semicolon, decimal comma, header in line 2, units in line 3; v0 [mm/s], mu_macro [%]'
-        """
-        is_utf8 = self.encoding in ("", "utf-8", "utf-8-sig")
-        words = [] if is_utf8 else [NAMES.get(self.encoding, self.encoding)]
-        words += [_WORDS.get(self.sep, repr(self.sep))]
-        words += ["decimal comma"] if signs.decimal == "," else []
-        words += [f"{_WORDS_OF_SIGNS[signs.grouped]} between thousands"] if signs.grouped else []
-        words += [f"header in line {self.line}"] if self.line > 1 else []
-        lines = sorted(self.units.lines)
-        places = ", ".join(map(str, lines))
-        words += [f"units in line{'s' * (len(lines) > 1)} {places}"] if lines else []
-        words += [f"rows {self.first}..{self.last}"] if self.last else []
-        units = (f"{name} [{self.units.unit(i)}]" for i, name in self.inputs.items())
-        return f"{', '.join(words)}; {', '.join(units)}"
+    def completed(self, lines: Sequence[str]) -> "Dialect":
+        """Return also what a line ``sep=;`` or the first lines of LabVIEW say."""
+        first = next((line for line in lines if line.strip()), "")
+        if match := _SEP_LINE.fullmatch(first.rstrip("\n")):
+            return self._replace(sep=self.sep or match[1])
+        if not first.lstrip("\ufeff").startswith("LabVIEW Measurement"):
+            return self
+        sep, decimal, units, ends = "\t", self.decimal, None, 0
+        for i, line in enumerate(lines[:LOOKED_AT]):
+            tag, *values = re.split(r"[\t,]", line.strip(), maxsplit=1)
+            value = values[0].strip() if values else ""
+            ends += tag == END_OF_HEADER
+            if tag == "Separator":
+                sep = "," if value.lower() == "comma" else "\t"
+            elif tag == "Decimal_Separator" and not self.decimal:
+                decimal = value if value in (".", ",") else None
+            elif tag == "Y_Unit_Label" and ends < 2:
+                units = i
+        return self._replace(sep=self.sep or sep, decimal=decimal, labview=True, units=units)
 
 
-def find_layout(
-    lines: list[str], column_names: ColumnNames, dialect: Dialect, encoding: str = ""
-) -> Layout:
-    """Find how a table is written, from its first lines.
+class ColumnNames(NamedTuple):
+    """Name the columns of a table that have a meaning."""
 
-    If no line has all necessary names, the header is the line that is most probably meant as a
-    header.  Raise TextError if there is no line at all, if units belong to no column or contradict
-    each other, or if there are rows before the header.
-    """
-    declared = _declared(lines)
-    header = _find_header(lines, column_names, dialect, declared)
-    while header.cells and not header.cells[-1]:
-        header.cells.pop()
-    units = ColumnUnits(header.cells, header.sep, column_names.input_of)
-    account = Account(header, units, column_names, dialect.dashes, declared.labview)
-    end = header.end
-    if declared.units is not None:
-        cells = split_header(lines[declared.units], header.sep)
-        units.take_cells(declared.units + 1, ["", *cells[1:]])
-    if column_names.are_all_in(units.heads):
-        if declared.units is None:
-            _take_above(units, lines[: header.start], dialect.skip)
-        end = _first_row(account, lines, dialect)
-    elif dialect.rows:
-        end = dialect.rows[0] - 1
-    before = [i for i in range(min(end, len(lines))) if lines[i].strip()]
-    is_header = range(header.start, header.end)
-    return Layout(
-        encoding,
-        header,
-        units,
-        declared,
-        end + 1,
-        dialect.rows[1] if dialect.rows else None,
-        [i + 1 for i in before if i + 1 not in units.lines and i not in is_header],
-        account.repeated,
-    )
+    input_of: Mapping[str, str]  #: by name: the input whose units the column has
+    #: of each of these lists, one name must be in the table
+    required_groups: Sequence[Sequence[str]]
+
+    def are_all_in(self, names: Iterable[str]) -> bool:
+        """Return whether the names of some columns contain all necessary ones."""
+        present = {*names}
+        return not any(present.isdisjoint(group) for group in self.required_groups)
+
+    def may_be_in(self, text: str) -> bool:
+        """Return whether a text contains all necessary names, as words or within other words."""
+        return all(any(name in text for name in names) for names in self.required_groups)
+
+    def split(self, cells: Sequence[str]) -> list[tuple[str, str | None]]:
+        """Return the name and the unit in each cell of a header."""
+        return [split_unit(heading(cell, self.input_of)) for cell in cells]
 
 
-def _take_above(units: ColumnUnits, lines: Sequence[str], skip: int) -> None:
-    """Take the units above the header: a row close to it, legends, and comments of ECSV."""
-    above = [i for i in reversed(range(skip, len(lines))) if lines[i].strip()]
-    row = next((i for i in above[:_ABOVE] if units.take_row(i + 1, lines[i])), None)
-    if any("%ECSV" in lines[i][:20] for i in above):
-        units.take_ecsv(lines)
-        return
-    for i in reversed(above):
-        if i != row:
-            units.take_legend(i + 1, lines[i])
+class Header(NamedTuple):
+    """Hold the line with the names of the columns."""
+
+    start: int  #: its line, from 0
+    end: int  #: the next line after it
+    sep: str
+    cells: list[str]
 
 
-def _first_row(account: Account, lines: Sequence[str], dialect: Dialect) -> int:
-    """Return the index of the first row; account for the lines between the header and it."""
-    header = account.header
-    if dialect.rows:
-        end = dialect.rows[0] - 1
-        for i in range(header.end, min(end, len(lines))):
-            account.units.take(i + 1, lines[i])
-        return max(end, header.end)
-    for i in range(header.end, len(lines)):
-        text = lines[i] if is_comment(lines[i]) else _whole(lines, i)[0]
-        if account.is_row(i + 1, text):
-            return i
-    return max(len(lines), header.end)
-
-
-# --- the header -----------------------------------------------------------------------------------
-
-
-def _declared(lines: Sequence[str]) -> _Declared:
-    """Return what a line ``sep=;`` or the first lines of LabVIEW say."""
-    first = next((line for line in lines if line.strip()), "")
-    if match := _SEP_LINE.fullmatch(first.rstrip("\n")):
-        return _Declared(sep=match[1])
-    if not first.lstrip("\ufeff").startswith("LabVIEW Measurement"):
-        return _Declared()
-    sep = decimal = units = None
-    ends = 0
-    for i, line in enumerate(lines[:LOOKED_AT]):
-        tag, *values = re.split(r"[\t,]", line.strip(), maxsplit=1)
-        value = values[0].strip() if values else ""
-        ends += tag == END_OF_HEADER
-        if tag == "Separator":
-            sep = "," if value.lower() == "comma" else "\t"
-        elif tag == "Decimal_Separator":
-            decimal = value if value in (".", ",") else None
-        elif tag == "Y_Unit_Label" and ends < 2:
-            units = i
-    return _Declared(sep or "\t", decimal, True, units)
-
-
-def _find_header(
-    lines: list[str], column_names: ColumnNames, dialect: Dialect, declared: _Declared
-) -> Header:
+def find_header(lines: list[str], column_names: ColumnNames, dialect: Dialect) -> Header:
     """Return the first line that has all necessary names and fits the next row.  If a person names
-    the rows, return the last such line before them."""
-    sep = dialect.sep or declared.sep
-    seps = (sep,) if sep else tuple(SEPARATORS.values())
+    the rows, return the last such line before them.
+
+    If no line has the names, return the line that is most probably meant as a header.  Raise
+    TextError if there is no line at all, or if there are rows before the header.
+    """
+    seps = (dialect.sep,) if dialect.sep else tuple(SEPARATORS.values())
     candidates = [*islice(_headers_in(lines, dialect.skip, seps, column_names), 20)]
     if dialect.rows:
         candidates = [one for one in candidates if one.start + 1 < dialect.rows[0]][::-1]
-    header = next((one for one in candidates if _fits(one, lines, declared.labview)), None)
+    header = next((one for one in candidates if _fits(one, lines, dialect.labview)), None)
     header = header or (candidates[0] if candidates else _likely_header(lines, dialect.skip, seps))
     if not dialect.rows:
         for one in candidates:
@@ -271,7 +144,7 @@ def _headers_in(
         # with an odd number of quotes a cell continues in the next line
         if not column_names.may_be_in(lines[i]) and lines[i].count('"') % 2 == 0:
             continue
-        text, end = _whole(lines, i)
+        text, end = whole(lines, i)
         bare = uncommented(text)
         texts = [bare]
         if bare != text and (label := _LABEL.match(bare)):  # "# columns: v0 mu_macro"
@@ -279,12 +152,11 @@ def _headers_in(
         for sep in seps:
             for bare in texts:
                 cells = split_header(bare, sep)
-                heads = [heading(cell, column_names.input_of) for cell in cells]
-                if column_names.are_all_in(heads):
+                if column_names.are_all_in(name for name, _ in column_names.split(cells)):
                     yield Header(i, end, sep, cells)
 
 
-def _whole(lines: Sequence[str], i: int) -> tuple[str, int]:
+def whole(lines: Sequence[str], i: int) -> tuple[str, int]:
     """Return a line with the following lines in which its quoted cells end, and the index after
     them."""
     text = lines[i]
@@ -300,7 +172,7 @@ def _fits(header: Header, lines: Sequence[str], labview: bool) -> bool:
     width = len(header.cells)
     for i in range(header.end, len(lines)):
         if lines[i].strip() and not is_comment(lines[i]):
-            cells = split_header(_whole(lines, i)[0], header.sep)
+            cells = split_header(whole(lines, i)[0], header.sep)
             return len(cells) in (width, width - labview) or not any(cells[width:] or ["x"])
     return True
 

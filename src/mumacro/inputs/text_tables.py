@@ -1,14 +1,12 @@
-"""Read the rows of tables as people and rigs write them, in pieces, and whole tables in memory.
+"""Read tables as people and rigs write them, in pieces, and whole tables in memory.
 
 A line passes these modules: :mod:`mumacro.inputs.decoding` makes lines of bytes; ``layout`` finds
-the separator and the header, ``column_units`` the units; ``account`` decides what each line is;
-this module cuts out the rows; ``numbers`` finds the decimal separator, and ``cells`` reads the
-numbers.
+the separator and the header, ``column_units`` the units; ``account`` says what each line is and
+cuts out the rows; ``numbers`` finds the decimal separator, and ``cells`` reads the numbers.
 """
 
-import csv
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -16,30 +14,19 @@ from typing import NamedTuple
 import numpy as np
 
 from mumacro.errors import TextError
-from mumacro.inputs.account import Account, ColumnNames, names_statistics
-from mumacro.inputs.cells import BLANKS, MOST_COLUMNS, is_comment, numbers_of, split_row
-from mumacro.inputs.decoding import LONGEST, Piece, Text, file_pieces
-from mumacro.inputs.layout import LOOKED_AT, Dialect, find_layout
+from mumacro.inputs.account import Account, Rows, names_statistics, unclosed
+from mumacro.inputs.cells import BLANKS, MOST_COLUMNS, numbers_of
+from mumacro.inputs.decoding import LONGEST, NAMES, Piece, Text, byte_pieces
+from mumacro.inputs.layout import LOOKED_AT, ColumnNames, Dialect
 from mumacro.inputs.names import absent, find_heads
-from mumacro.inputs.numbers import Cell
+from mumacro.inputs.numbers import Cell, Signs
 from mumacro.inputs.units import in_si, too_large_in_si
 from mumacro.inputs.workbooks import BEGIN, SEP, read_sheet
 from mumacro.kernel.arrays import Array
 
-_BETWEEN_BLANKS = re.compile(r'"[^"]*"|\S+')
+_WORDS = {",": "comma", ";": "semicolon", "|": "bar", "\t": "tab", BLANKS: "blanks"}
+_WORDS_OF_SIGNS = {".": "point", ",": "comma"}
 _BETWEEN = re.compile(r"[,;|\s]+")  # anything that separates cells
-# by the separator: a quoted cell after blanks, any quoted cell, and a quote that begins a cell
-_BEHIND_BLANKS, _QUOTED, _OPEN_QUOTE = (
-    {sep: re.compile(pattern.replace("SEP", re.escape(sep))) for sep in ",;|\t"}
-    for pattern in (
-        r'(?<![^SEP\n]) ++("(?:[^"]++|"")*+"(?=SEP|\n|\Z))',
-        r'"(?<![^SEP\n]")(?:[^"]++|"")*+"(?=SEP|\n|\Z)',
-        r'(?<![^SEP\n]) *+"',
-    )
-)
-_CLOSING = re.compile(r'(?:[^"]++|"")*+"')  # the rest of a quoted cell
-_UNCLOSED = re.compile(r' *+"(?:[^"]++|"")*+\Z')
-_EXCERPT = 500  # characters that are kept of a refused row
 _AT_ONCE = 2_000  # rows that are searched for the decimal separator at a time
 
 
@@ -67,79 +54,6 @@ class Most(NamedTuple):
                     raise TextError(f"line {number}: there may be up to {self.columns:,} columns")
 
 
-class Rows(NamedTuple):
-    """Hold rows of a table in order, as text: each has as many cells as the header."""
-
-    sep: str
-    texts: list[str]
-    lines: Sequence[int]  #: the line of the file in which each row begins
-    #: by the index of a row: its text, and why it does not belong to this table; its cells are
-    #: empty
-    faults: dict[int, tuple[str, str]]
-
-    def cells(self) -> Iterator[list[str]]:
-        """Yield the cells of each row."""
-        for line, text in zip(self.lines, self.texts, strict=True):
-            try:
-                yield split_row(text, self.sep)
-            except csv.Error as error:
-                raise TextError(f"line {line}: {error}") from None
-
-
-class _OpenRow:
-    """Collect the lines of a row that has a line end in a quoted cell."""
-
-    def __init__(self, account: Account) -> None:
-        self._account = account
-        self.line = 0  #: the line in which the row begins
-        self._lines: list[str] = []
-        self._size = 0  # characters
-
-    def __bool__(self) -> bool:
-        return bool(self._lines)
-
-    def whole(self, number: int, line: str) -> str | None:
-        """Return the row that ends with this line, or None if it goes on.  Raise TextError if a
-        quote is not at the end of its cell."""
-        sep, end = self._account.sep, 0
-        if self._lines:
-            closing = _CLOSING.match(line)
-            if closing is None:
-                self._add(line)
-                return None
-            end = closing.end()
-        elif '"' not in line or (is_comment(line) and not self._account.has_name(line)):
-            return line
-        else:
-            self.line = number
-        rest = line[end:]
-        rest = _BEHIND_BLANKS[sep].sub(r"\1", rest) if ' "' in rest else rest
-        bare = _QUOTED[sep].sub(lambda match: "0" * len(match[0]), rest)
-        open_quote = _OPEN_QUOTE[sep].search(bare)
-        if (end and rest and rest[0] != sep) or (
-            open_quote and not _UNCLOSED.match(rest, open_quote.start())
-        ):
-            raise unclosed(self.line)
-        if open_quote:
-            self._add(line[:end] + rest)
-            return None
-        row = "\n".join([*self._lines, line[:end] + rest])
-        self._lines, self._size = [], 0
-        return row
-
-    def _add(self, line: str) -> None:
-        """Add a line after which the row goes on."""
-        self._lines.append(line)
-        self._size += len(line)
-        if self._size > LONGEST:
-            raise unclosed(self.line)
-
-
-def unclosed(line: int) -> TextError:
-    """Return the error for a row with a quote that does not end its cell."""
-    return TextError(f"line {line}: a quote is not closed, or not at the end of its cell")
-
-
 # --- whole tables ---------------------------------------------------------------------------------
 
 
@@ -154,77 +68,67 @@ class TextTable:
         source: Path | bytes,
         column_names: ColumnNames,
         dialect: Dialect,
-        check: Callable[[Piece], None] = lambda _piece: None,
+        most: Most | None = None,
     ) -> None:
-        self._column_names, self._check = column_names, check
-        self._source, self._dialect, self._said = _sheet_in(source, column_names, dialect)
-        text, start = self._text(), list[str]()
+        self._source, dialect, self._sheets = _sheet_in(source, column_names, dialect)
+        self._most = most
+        text, lines = Text(byte_pieces(self._source), dialect.encoding), list[str]()
         self._start = list[Piece]()  # first pieces of the text
-        for piece in text:
-            check(piece)
+        for piece in text.pieces():
+            if most is not None:
+                most.check(piece)
             self._start.append(piece)
-            start += piece.lines
-            if len(start) >= LOOKED_AT:
+            lines += piece.lines
+            if len(lines) >= LOOKED_AT:
                 break
-        self.layout = find_layout(start, column_names, self._dialect, text.encoding)
-        self.signs = self._dialect.signs(self.layout)
-        self.account = self.layout.account(column_names, self._dialect)
+        self.account = Account(lines, column_names, dialect, text.encoding)
+        decimal, sep = self.account.dialect.decimal, self.account.header.sep
+        self.signs = Signs(decimal, dialect.thousands, sep, dialect.dashes)
 
     @property
     def read_as(self) -> str:
-        """Return how the table was read, after it was read."""
-        described = self.layout.described(self.signs)
-        return self._said + described + headers_left_out(self.account.repeated)
+        """Return in a few words how the table was read, with the unit of each input, after it was
+        read."""
+        account, grouped = self.account, self.signs.grouped
+        is_utf8 = account.encoding in ("", "utf-8", "utf-8-sig")
+        words = [] if is_utf8 else [NAMES.get(account.encoding, account.encoding)]
+        words += [_WORDS.get(account.header.sep, repr(account.header.sep))]
+        words += ["decimal comma"] if self.signs.decimal == "," else []
+        words += [f"{_WORDS_OF_SIGNS[grouped]} between thousands"] if grouped else []
+        words += [f"header in line {account.header.start + 1}"] if account.header.start else []
+        lines = sorted(account.units.lines)
+        places = ", ".join(map(str, lines))
+        words += [f"units in line{'s' * (len(lines) > 1)} {places}"] if lines else []
+        words += [f"rows {account.first}..{account.last}"] if account.last else []
+        units = (f"{name} [{account.units.unit(i)}]" for i, name in account.units.inputs.items())
+        again = headers_left_out(sorted(account.repeated))
+        return f"{self._sheets}{', '.join(words)}; {', '.join(units)}{again}"
 
     def find_signs(self) -> None:
-        """Search the first rows, and then the first pieces, for the separators of numbers.  Skip
-        this if columns are missing, because then that is reported."""
-        is_known = self._column_names.are_all_in(self.layout.heads)
-        for last in (self.layout.first + _AT_ONCE, None):
-            if is_known and not self.signs.decimal:
-                for piece in self._data_of(self._start, last):
-                    self.see_signs(self.rows_in(piece))
+        """Search the first pieces for the separators of numbers, some rows at a time.  Skip this if
+        columns are missing, because then that is reported."""
+        for piece in self._data_of(self._start) if self.account.has_names else ():
+            for part in piece.parts(_AT_ONCE):
+                if not self.signs.decimal:
+                    self.see_signs(self.account.rows_in(part))
         self._start = []
 
-    def pieces(self, report_place: Callable[[int], None] = lambda _place: None) -> Iterator[Piece]:
-        """Yield the lines from the first row on in pieces, and tell ``report_place`` how far a file
-        has been read."""
-        yield from self._data_of(self._text(report_place), None)
-        if self.open_row:
-            raise unclosed(self.open_row.line)
+    def pieces(self) -> Iterator[Piece]:
+        """Yield the lines from the first row on in pieces."""
+        text = Text(byte_pieces(self._source), self.account.dialect.encoding)
+        yield from self._data_of(text.pieces())
+        if self.account.open:
+            raise unclosed(self.account.begun)
 
-    def _data_of(self, pieces: Iterable[Piece], last: int | None) -> Iterator[Piece]:
-        """Yield the lines of data, up to the line ``last``."""
-        self.account = self.layout.account(self._column_names, self._dialect)
-        #: a row that continues after the piece that was read last
-        self.open_row = _OpenRow(self.account)
-        ends = [line for line in (last, self.layout.last) if line is not None]
-        end = min(ends, default=None)
+    def _data_of(self, pieces: Iterable[Piece]) -> Iterator[Piece]:
+        """Yield the lines of data."""
+        self.account.open = []
         for piece in pieces:
-            self._check(piece)
-            first, text = _between(piece, self.layout.first, end)
-            if text is not None:
-                yield Piece(first, text)
-
-    def rows_in(self, piece: Piece) -> Rows:
-        """Return the rows in some lines, each of which is accounted for."""
-        account, lines = self.account, list[int]()
-        rows = Rows(account.sep, [], lines, {})
-        for number, line in enumerate(piece.lines, piece.first):
-            if self.layout.sep == BLANKS:
-                cells = _BETWEEN_BLANKS.findall(line) if '"' in line else line.split()
-                line = account.sep.join(cells)
-            first = self.open_row.line if self.open_row else number
-            text = self.open_row.whole(number, line)
-            row = None if text is None else account.row(first, text)
-            if text is None or row is None:
-                continue
-            if row[1] is not None:
-                excerpt = text if len(text) <= _EXCERPT else f"{text[:_EXCERPT]}…"
-                rows.faults[len(rows.texts)] = excerpt, row[1]
-            rows.texts.append(row[0])
-            lines.append(first)
-        return rows
+            if self._most is not None:
+                self._most.check(piece)
+            data = piece.between(self.account.first, self.account.last)
+            if data is not None:
+                yield data
 
     def see_signs(self, rows: Rows) -> None:
         """Examine the numbers of some rows until they show their separators."""
@@ -234,28 +138,8 @@ class TextTable:
                 Cell(line, name, cells[i])
                 for j, (line, cells) in some
                 if j not in rows.faults
-                for i, name in self.layout.inputs.items()
+                for i, name in self.account.units.inputs.items()
             )
-
-    def _text(self, report_place: Callable[[int], None] = lambda _place: None) -> Text:
-        """Return the text from its beginning."""
-        source = self._source
-        pieces = [source] if isinstance(source, bytes) else file_pieces(source, report_place)
-        return Text(pieces, self._dialect.encoding)
-
-
-def _between(piece: Piece, first: int, last: int | None) -> tuple[int, str | None]:
-    """Return the lines of a piece from ``first`` to ``last``, and the number of the first of them;
-    None if there are none."""
-    start, text = piece
-    if start < first:
-        lines = text.split("\n", first - start)
-        if len(lines) <= first - start:
-            return first, None
-        start, text = first, lines[-1]
-    if last is not None:
-        text = "\n".join(text.split("\n", last - start + 1)[: max(last - start + 1, 0)])
-    return start, text if last is None or start <= last else None
 
 
 def _sheet_in(
@@ -274,8 +158,7 @@ def _sheet_in(
         return source, dialect, ""
 
     def has_names(lines: list[str]) -> bool:
-        layout = find_layout(lines, column_names, dialect._replace(sep=SEP))
-        return column_names.are_all_in(layout.heads)
+        return Account(lines, column_names, dialect._replace(sep=SEP)).has_names
 
     data, said = read_sheet(source, dialect.sheet, dialect.decimal, has_names)
     return data, dialect._replace(sep=SEP, encoding="utf-8"), said
@@ -289,7 +172,7 @@ class TableOfNumbers(NamedTuple):
     units: dict[str, str]  #: unit of each column in the table; the SI unit if it has none
     lines: list[int]  #: line of each row
     skipped: list[int]  #: lines that are not empty, not the header, not units and not rows
-    read_as: str  #: how the table was read, see :meth:`mumacro.inputs.layout.Layout.described`
+    read_as: str  #: how the table was read, see :attr:`TextTable.read_as`
 
 
 def read_numbers(
@@ -310,18 +193,20 @@ def read_numbers(
     >>> table.read_as
     'tab, decimal comma, header in line 3, units in line 4; v0 [mm/s], mu_macro [%]'
     """
-    table = TextTable(source, column_names, dialect, most.check)
-    layout, signs, input_of = table.layout, table.signs, column_names.input_of
-    columns, faults = find_heads(layout.heads, input_of)
+    table = TextTable(source, column_names, dialect, most)
+    account, signs, input_of = table.account, table.signs, column_names.input_of
+    columns, faults = find_heads(account.units.heads, input_of)
     missing = [
         group[0] for group in column_names.required_groups if not columns.keys() & set(group)
     ]
     if missing:
-        faults.append(absent(missing, layout.heads))
+        faults.append(absent(missing, account.units.heads))
     if faults:
-        raise TextError.of([f"line {layout.line}: {fault}" for fault in faults])
+        raise TextError.of([f"line {account.header.start + 1}: {fault}" for fault in faults])
     lines, rows, wrong = list[int](), list[list[str]](), list[tuple[int, str]]()
-    for part in map(table.rows_in, table.pieces()):
+    skipped = account.skipped
+    for part in map(account.rows_in, table.pieces()):
+        skipped += part.skipped
         if len(lines) + len(part.lines) > most.rows:
             where = f"line {part.lines[most.rows - len(lines)]}"
             raise TextError(f"{where}: there are more than {most.rows:,} rows: average them")
@@ -332,8 +217,8 @@ def read_numbers(
                 lines.append(line)
                 rows.append(cells)
     if not rows and not wrong:
-        raise TextError(f"line {layout.line}: no row follows the names of the columns")
-    _refuse_named_statistics(table.account, lines, rows)
+        raise TextError(f"line {account.header.start + 1}: no row follows the names of the columns")
+    _refuse_named_statistics(account, lines, rows)
     signs.see(
         Cell(line, name, cells[i])
         for line, cells in zip(lines, rows, strict=True)
@@ -350,8 +235,7 @@ def read_numbers(
             wrong.append((lines[j], f"line {lines[j]}: {name} {fault}"))
     if wrong:
         raise _wrong_rows(sorted(wrong, key=lambda one: one[0]), lines, dialect)
-    units = {name: layout.units.unit(i) for name, (i, _) in columns.items()}
-    skipped = sorted({*layout.skipped, *table.account.skipped})
+    units = {name: account.units.unit(i) for name, (i, _) in columns.items()}
     return TableOfNumbers(si, as_written, units, lines, skipped, table.read_as)
 
 

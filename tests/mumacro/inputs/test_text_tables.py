@@ -22,10 +22,9 @@ from hypothesis import strategies as st
 from mumacro.errors import InputError, TextError
 from mumacro.fits.fit import fit
 from mumacro.fits.measured_points import read_points
-from mumacro.inputs.account import ColumnNames
 from mumacro.inputs.cells import BLANKS, GAPS, numbers_of, read_cell
 from mumacro.inputs.decoding import Text, encoding_of
-from mumacro.inputs.layout import Dialect
+from mumacro.inputs.layout import ColumnNames, Dialect
 from mumacro.inputs.names import absent
 from mumacro.inputs.numbers import Signs, evidence
 from mumacro.inputs.text_tables import TableOfNumbers, read_numbers
@@ -258,13 +257,14 @@ def test_lines_do_not_depend_on_how_the_bytes_come(
     text: str, encoding: str, cuts: list[int]
 ) -> None:
     data = text.encode(encoding)
-    places = [0, *sorted(min(cut, len(data)) for cut in cuts), len(data)]
-    pieces = [data[a:b] for a, b in itertools.pairwise(places)]
+    # the first piece shows the encoding
+    places = [0, *sorted(min(4 + cut, len(data)) for cut in cuts), len(data)]
+    pieces = [(data[a:b], 0.0) for a, b in itertools.pairwise(places)]
     expected = re.split("\r\n|\r|\n", text)
     expected = expected[:-1] if expected[-1] == "" else expected
     numbered = [
         (piece.first + i, line)
-        for piece in Text(pieces, None if encoding != "utf-8" else "utf-8")
+        for piece in Text(pieces, None if encoding != "utf-8" else "utf-8").pieces()
         for i, line in enumerate(piece.lines)
     ]
     assert numbered == list(enumerate(expected, 1))
@@ -286,6 +286,11 @@ def test_bytes_after_ascii_are_windows_1252_and_mixed_ones_are_refused() -> None
     assert read((head + "µ").encode("cp1252")).columns["v0"].tolist() == [1.0]
     assert "line 3" in str(refused((head + "µ\n2,0.3,").encode() + b"\xb5"))
     assert "0x81" in str(refused(head.encode() + b"\x81"))
+
+
+def test_a_text_that_is_not_in_the_encoding_that_is_named_is_refused() -> None:
+    fault = refused("v0,mu_macro\n1,0.2\n", encoding="utf-16")
+    assert "give utf-16-le or utf-16-be" in str(fault)
 
 
 # --- options --------------------------------------------------------------------------------------
