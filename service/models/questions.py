@@ -19,9 +19,9 @@ from pydantic_core import InitErrorDetails
 
 from mumacro.errors import InputError
 from mumacro.inputs.case import no_number, read_one, reason_of
+from mumacro.inputs.cells import THOUSANDS
 from mumacro.inputs.fields import AMPLITUDE, MOST_HZ, QUANTITY_OF, STIFFNESS, described
 from mumacro.inputs.layout import SEPARATORS, Dialect
-from mumacro.inputs.numbers import THOUSANDS
 from mumacro.motions.motion import PARTS
 from mumacro.motions.solve_motion import UNKNOWNS
 from mumacro.stiffness import GEOMETRIES

@@ -9,8 +9,8 @@ from typing import Any
 
 from mumacro.cli.common import ImpossibleError, UsageError
 from mumacro.errors import InputError, TextError
+from mumacro.inputs.cells import THOUSANDS
 from mumacro.inputs.layout import SEPARATORS, Dialect
-from mumacro.inputs.numbers import THOUSANDS
 from mumacro.inputs.text_tables import TableOfNumbers
 
 

@@ -16,7 +16,7 @@ import pyarrow.compute as pc
 from mumacro.errors import InputError, MumacroError
 from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import ALL_FIELDS, DEVIATIONS, KIND, Cases, other_amplitude
-from mumacro.inputs.cells import numbers_of
+from mumacro.inputs.cells import Signs, numbers_of
 from mumacro.inputs.fields import (
     AMPLITUDE,
     ENDS,
@@ -29,9 +29,8 @@ from mumacro.inputs.fields import (
     refusal,
 )
 from mumacro.inputs.layout import ColumnNames
-from mumacro.inputs.names import absent, find_heads, meant_by
-from mumacro.inputs.numbers import Signs
-from mumacro.inputs.units import Scale, in_si, scale_of, split_unit, too_large_in_si
+from mumacro.inputs.names import absent, find_heads, meant_by, split_unit
+from mumacro.inputs.units import Scale, in_si, scale_of, too_large_in_si
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.answer import BAND, DEFAULT, TEXTS
@@ -40,6 +39,9 @@ from mumacro.results import Note
 from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
 
+#: columns that a table of cases may have, and the input whose units each has
+_INPUT_OF = {name: MEASURED_AS.get(name, name) for name in (*ALL_FIELDS, "f", *ENDS)}
+_INPUT_OF |= {column: MEASURED_AS.get(name, name) for column, name in DEVIATIONS.items()}
 #: columns that are always added
 ANSWERS = DEFAULT
 #: for a row without a result: its index, the input (null if the fault is the row), the value, the
@@ -166,36 +168,36 @@ def find_columns(
     >>> find_columns(["mu0", "Fz [kN]", "k", "y0", "f", "v0", "note"]).headings["Fz"]
     ('Fz [kN]', Scale(times=1000.0, over=1.0))
     """
-    quantities = {name: MEASURED_AS.get(name, name) for name in (*ALL_FIELDS, "f", *ENDS)}
-    quantities |= {column: MEASURED_AS.get(name, name) for column, name in DEVIATIONS.items()}
     units = units or {}
-    heads, faults = find_heads([_with_unit(name, units.get(name)) for name in names], quantities)
+    with_units = [
+        f"{name} [{unit}]" if (unit := units.get(name)) and split_unit(name)[1] is None else name
+        for name in names
+    ]
+    heads, faults = find_heads(with_units, _INPUT_OF)
     for name, (i, scale) in heads.items():
         unit = units.get(names[i])
-        if unit and scale_of(quantities[name], unit) not in (scale, None):
+        if unit and scale_of(_INPUT_OF[name], unit) not in (scale, None):
             faults.append(f"the column {names[i]!r} has another unit in its field: {unit}")
     words = [name for name in KIND if name in names]
-    all_names = {*heads, *words}
-    other_names = dict.fromkeys(name for name in names if split_unit(name)[0] not in all_names)
-    counts = Counter(names)
     faults += [
-        f"the column {name!r} is there twice" for name in (*other_names, *words) if counts[name] > 1
+        f"the column {name!r} is there twice"
+        for name, count in Counter(names).items()
+        if count > 1 and split_unit(name)[0] not in heads
     ]
-    stiffness_columns = [column for column in names if meant_by(column, loosely=False) == "k"]
-    if rigid and stiffness_columns:
+    if rigid and (stiffness := [name for name in names if meant_by(name, loosely=False) == "k"]):
         faults.append(
-            f"--rigid is given, but the column {stiffness_columns[0]!r} looks like a stiffness; "
-            "leave one out"
+            f"--rigid is given, but the column {stiffness[0]!r} looks like a stiffness; leave one "
+            "out"
         )
     if "k" in heads and (end := [name for name in ENDS if name in heads]):
         faults.append(f"there are both k and {end[0]}; leave one out")
     ends = ENDS if heads.keys() & {*ENDS} else () if rigid else ("k",)
     fields = kind.fields
     necessary = [name for field in fields for name in (ends if field == "k" else (field,))]
-    faults += _absent(
-        [name for name in necessary if name not in heads and (name != "omega" or "f" not in heads)],
-        names,
-    )
+    if missing := [
+        name for name in necessary if name not in heads and (name != "omega" or "f" not in heads)
+    ]:
+        faults += _absent(missing, names)
     deviations = any(column in heads for column in DEVIATIONS)
     output_names = {*names_in(include)} | ({"std"} if deviations else set())
     outputs = [output for name, output in OUTPUTS.items() if name in output_names]
@@ -208,14 +210,9 @@ def find_columns(
     ]
     if faults:
         raise FilesError(where + "; ".join(faults))
-    found = [name for name in quantities if name in heads]
+    found = [name for name in _INPUT_OF if name in heads]
     headings = {name: (names[heads[name][0]], heads[name][1]) for name in found}
     return Columns(headings, words, kind, tuple(include), answer_names)
-
-
-def _with_unit(name: str, unit: str | None) -> str:
-    """Return a header with the unit of its field, if the header has none."""
-    return f"{name} [{unit}]" if unit and split_unit(name)[1] is None else name
 
 
 def kind_of_batch(batch: pa.RecordBatch, kind: Kind, where: str = "") -> Kind:
@@ -250,12 +247,9 @@ def kind_of_batch(batch: pa.RecordBatch, kind: Kind, where: str = "") -> Kind:
 
 def names_of_columns(rigid: bool = False) -> ColumnNames:
     """Return the columns that a table of cases may have, and the ones that it needs."""
-    names = [*SI, *MEASURED_AS]
-    quantities = {name: MEASURED_AS.get(name, name) for name in names}
-    quantities |= {f"std_{name}": quantity for name, quantity in quantities.items()}
     stiffness = [] if rigid else [("k", ENDS[0])]
     groups = [("mu0",), ("Fz",), *stiffness, ("y0", AMPLITUDE), ("omega", "f"), ("v0",)]
-    return ColumnNames(quantities, groups)
+    return ColumnNames(_INPUT_OF, groups)
 
 
 def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
@@ -280,18 +274,22 @@ def answer_columns(
     if columns.words and (kind := kind_of_batch(batch, SPRING)) != columns.kind:
         kinds = " and ".join(", ".join(one.names.values()) for one in (columns.kind, kind))
         raise FilesError(f"the file holds {kinds}: it is one for a file; write a file for each")
-    by_heading: dict[str, Array] = {}
-    values: dict[str, Any] = {} if {"k", *ENDS} & columns.headings.keys() else {"k": math.inf}
-    faults: dict[str, dict[int, str]] = {}
-    for name, (heading, scale) in columns.headings.items():
-        column, si, unread = numbers(batch.column(heading), name, signs or Signs(None, None), scale)
-        if name == columns.kind.other_amplitude:
-            if unread or not np.isnan(si).all():
-                error = other_amplitude(name, None, columns.kind)
-                raise FilesError(f"the column {heading!r} must be {error.bound}")
-            continue
-        by_heading[heading], values[name], faults[name] = column, si, unread
-    cases = Cases.of(values, columns.kind)
+    signs, headings, kind = signs or Signs(None, None), columns.headings, columns.kind
+    read = {
+        name: _numbers(batch.column(head), name, signs, s) for name, (head, s) in headings.items()
+    }
+    values: dict[str, Any] = {} if {"k", *ENDS} & headings.keys() else {"k": math.inf}
+    values |= {name: in_si(numbers, headings[name][1]) for name, (numbers, _) in read.items()}
+    faults = {
+        name: unread | too_large_in_si(numbers, values[name])
+        for name, (numbers, unread) in read.items()
+    }
+    if (other := kind.other_amplitude) in read:
+        if faults[other] or not np.isnan(values[other]).all():
+            error = other_amplitude(other, None, kind)
+            raise FilesError(f"the column {headings[other][0]!r} must be {error.bound}")
+        del values[other]
+    cases = Cases.of(values, kind)
     result = surrogate.answer(cases, chosen(columns.include, cases))
     is_rejected = result.source_code < 0
     mask = is_rejected if is_rejected.any() else None
@@ -310,7 +308,8 @@ def answer_columns(
     for i in np.flatnonzero(is_rejected).tolist():
         name, reason = _field_and_reason(cases.reason(i))
         rejects.append((i, name, faults.get(name, {}).get(i, reason)))
-    in_heads = {name: split_unit(heading)[1] for name, (heading, _) in columns.headings.items()}
+    in_heads = {name: split_unit(heading)[1] for name, (heading, _) in headings.items()}
+    by_heading = {headings[name][0]: numbers for name, (numbers, _) in read.items()}
     notes = result.notes_in({name: unit for name, unit in in_heads.items() if unit})
     return AnswerColumns(
         [arrays[path] for path in columns.answer_names], rejects, by_heading, notes
@@ -323,38 +322,28 @@ def _dictionary(codes: Codes, words: Sequence[str], mask: Bools | None) -> pa.Ar
     )
 
 
-def numbers(
+def _numbers(
     array: pa.Array, name: str, signs: Signs, scale: Scale
-) -> tuple[Array, Array, dict[int, str]]:
-    """Return three values for a column of the input ``name``: its doubles (n,) in its own unit, the
-    same in SI (NaN where a cell has no number), and the faults of cells by row.
+) -> tuple[Array, dict[int, str]]:
+    """Return the doubles (n,) in a column of the input ``name``, in its own unit (NaN where a cell
+    has no number), and the faults of cells by row.
 
     Raise FilesError if the column's type is neither a number nor text.
     """
     if pa.types.is_dictionary(array.type):
         array = array.dictionary_decode()
-    arrow_type = array.type
-    if (
-        pa.types.is_string(arrow_type)
-        or pa.types.is_large_string(arrow_type)
-        or pa.types.is_string_view(arrow_type)
+    kind = array.type
+    if pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind):
+        return numbers_of(pc.cast(array, pa.string()).to_pylist(), _INPUT_OF[name], signs, scale)
+    if not (
+        pa.types.is_integer(kind)
+        or pa.types.is_floating(kind)
+        or pa.types.is_decimal(kind)
+        or pa.types.is_null(kind)
     ):
-        field = name.removeprefix("std_")
-        cells = pc.cast(array, pa.string()).to_pylist()
-        numbers, faults = numbers_of(cells, MEASURED_AS.get(field, field), signs, scale)
-        si = in_si(numbers, scale)
-        return numbers, si, faults | too_large_in_si(numbers, si)
-    is_number = (
-        pa.types.is_integer(arrow_type)
-        or pa.types.is_floating(arrow_type)
-        or pa.types.is_decimal(arrow_type)
-    )
-    if not (is_number or pa.types.is_null(arrow_type)):
-        raise FilesError(f"the column {name} holds {arrow_type}, not numbers")
+        raise FilesError(f"the column {name} holds {kind}, not numbers")
     column = pc.fill_null(pc.cast(array, pa.float64(), safe=False), math.nan)
-    values: Array = column.to_numpy(zero_copy_only=False)
-    si = in_si(values, scale)
-    return values, si, too_large_in_si(values, si)
+    return column.to_numpy(zero_copy_only=False), {}
 
 
 def _field_and_reason(error: InputError) -> tuple[str, str]:

@@ -21,7 +21,6 @@ from mumacro.files.record_batch import (
 )
 from mumacro.files.sources import ParquetSource, RowBlock, TextSource
 from mumacro.files.writing import OutputFormat, csv_lines, written_as
-from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cases import KIND
 from mumacro.inputs.fields import Kind, kind_of
 from mumacro.inputs.layout import Dialect
@@ -145,8 +144,7 @@ class _Run:
         if words := [name for name in KIND if name in names]:
             first = next(self.source.blocks(0, words), None)
             kind = kind if first is None else kind_of_batch(first.batch, kind, where)
-        units = units_of_fields(self.source.schema)
-        self.columns = find_columns(names, rigid, include, kind, where, units)
+        self.columns = find_columns(names, rigid, include, kind, where, self.source.units)
         headings = self.columns.headings
         sep, decimal = written_as(
             sources.ending_of(out), self.source.sep, self.source.decimal, dialect

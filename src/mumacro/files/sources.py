@@ -21,10 +21,9 @@ from mumacro.errors import TextError
 from mumacro.files.record_batch import FilesError
 from mumacro.inputs.account import NO_ROW, Rows
 from mumacro.inputs.carried import units_of_fields
-from mumacro.inputs.cells import BLANKS, GAPS, split_row
+from mumacro.inputs.cells import BLANKS, GAPS, Signs, split_row
 from mumacro.inputs.decoding import Piece
 from mumacro.inputs.layout import ColumnNames, Dialect
-from mumacro.inputs.numbers import Signs
 from mumacro.inputs.text_tables import TextTable
 
 #: extensions of files that can be written, and their format
@@ -135,8 +134,9 @@ class ParquetSource:
         options = {"format": "parquet", "partitioning": hive, "partition_base_dir": folder}
         dataset = pa.dataset.dataset(names, **options)
         schemas = [part.physical_schema.remove_metadata() for part in dataset.get_fragments()]
+        self.units = units_of_fields(schemas[0])  #: in the metadata of its fields
         for name, schema in zip(names[1:], schemas[1:], strict=True):
-            if units_of_fields(schema) != units_of_fields(schemas[0]):
+            if units_of_fields(schema) != self.units:
                 raise FilesError(f"{name}: its fields have other units than those of {names[0]}")
         self.schema = pa.unify_schemas([dataset.schema, *schemas], promote_options="permissive")
         self.parts = list(pa.dataset.dataset(names, schema=self.schema, **options).get_fragments())
@@ -173,6 +173,8 @@ class ParquetSource:
 class TextSource:
     """Read tables as text whose headers name the same columns.  Raise FilesError if one does
     not."""
+
+    units = None  # they are in the headers
 
     def __init__(
         self, files: Sequence[Path], dialect: Dialect, column_names: ColumnNames, to_text: bool

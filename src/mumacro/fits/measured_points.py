@@ -13,9 +13,8 @@ from mumacro.inputs.columns import to_si
 from mumacro.inputs.doubts import UNITS, remarks
 from mumacro.inputs.fields import AMPLITUDE, MEASURED_AS, NAMES, kind_of
 from mumacro.inputs.layout import ColumnNames, Dialect
-from mumacro.inputs.names import unknown_name
+from mumacro.inputs.names import split_unit, unknown_name
 from mumacro.inputs.text_tables import Most, TableOfNumbers, read_numbers
-from mumacro.inputs.units import split_unit
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.results import REMARK, Note
 from mumacro.surrogate import Surrogate

@@ -155,7 +155,8 @@ class Account:
             return max(rows[0], end + 1)
         for i in range(end, len(lines)):
             text = lines[i] if is_comment(lines[i]) else whole(lines, i)[0]
-            if self._what(i + 1, text) is Line.ROW:
+            if self._is_plain(text) or self._what(i + 1, text) is Line.ROW:
+                self.units.rows_begun = True
                 return i + 1
         return max(len(lines), end) + 1
 
@@ -175,6 +176,7 @@ class Account:
                 continue
             what, row, fault = self._row(self.begun, text)
             if what is Line.ROW:
+                self.units.rows_begun = True
                 if fault is not None:
                     excerpt = text if len(text) <= _EXCERPT else f"{text[:_EXCERPT]}…"
                     rows.faults[len(rows.texts)] = excerpt, fault
@@ -281,7 +283,6 @@ class Account:
             shown = " ".join(text.split())[:60]
             remedy = self.remedy(line)
             raise TextError(f"line {line}: {shown!r} is neither a row nor a comment: {remedy}")
-        self.units.rows_begun = True
         return Line.ROW
 
     def _again(self, line: int) -> Line:

@@ -44,9 +44,9 @@ from mumacro.inputs.fields import (
     kind_of,
     refusal,
 )
-from mumacro.inputs.names import in_place_of, suggestion
+from mumacro.inputs.names import in_place_of, split_unit, suggestion
 from mumacro.inputs.numbers import check_signs
-from mumacro.inputs.units import scale_of, split_unit
+from mumacro.inputs.units import scale_of
 from mumacro.kernel.arrays import Array, Places, flat
 
 

@@ -19,8 +19,8 @@ from mumacro.inputs.cells import (
     starts_as_number,
     uncommented,
 )
-from mumacro.inputs.names import heading, meant_by
-from mumacro.inputs.units import Scale, scale_of, split_unit, unit_of
+from mumacro.inputs.names import heading, meant_by, split_unit
+from mumacro.inputs.units import Scale, scale_of, unit_of
 
 SI_UNIT = Scale()
 _LEAVE_ONE = "leave one of them out"
@@ -77,9 +77,10 @@ class ColumnUnits:
             for i, head in enumerate(self._heads)
         ]
 
-    def unit(self, i: int) -> str:
-        """Return the unit of an input's column."""
-        return self._units.get(i, ("", None))[0] or unit_of(self.names[i])
+    def of_inputs(self) -> dict[str, str]:
+        """Return the unit of each input; the SI unit if the table has none."""
+        units = {name: self._units.get(i, ("", None))[0] for i, name in self.inputs.items()}
+        return {name: unit or unit_of(name) for name, unit in units.items()}
 
     def agrees(self, i: int, unit: str | None) -> bool:
         """Return whether a unit is the unit of an input's column; None stands for the SI unit."""
@@ -176,7 +177,8 @@ class ColumnUnits:
                     remedy = f"write the unit behind the name, as in {name} [{unit}]"
                 else:
                     says = "the header says" if before[1] is None else f"line {before[1]} says"
-                what = f"{name} is in {unit}, {says} {self.unit(i)}"
+                unit_before = before[0] if before and before[0] else unit_of(name)
+                what = f"{name} is in {unit}, {says} {unit_before}"
                 raise TextError(f"line {line}: {what}: {remedy}")
         if not self.rows_begun:
             self._units.setdefault(

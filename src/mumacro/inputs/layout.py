@@ -18,8 +18,7 @@ from mumacro.inputs.cells import (
     starts_as_number,
     uncommented,
 )
-from mumacro.inputs.names import heading, meant_by
-from mumacro.inputs.units import split_unit
+from mumacro.inputs.names import heading, meant_by, split_unit
 
 #: separators of the cells, by the name in an option
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t", "blanks": BLANKS}

@@ -12,62 +12,23 @@ from mumacro.inputs.units import (
     canonical,
     explain_unit,
     scale_of,
-    split_unit,
     unit_of,
 )
 
 # Lower case, without spaces and punctuation.  Only names that hardly have another meaning, because
 # a file with such a column is refused if the input itself is missing.
 _SYNONYMS = {
-    "mu": "mu0",
-    "mus": "mu0",
-    "muk": "mu0",
-    "mucoulomb": "mu0",
-    "frictioncoefficient": "mu0",
-    "coefficientoffriction": "mu0",
-    "cof": "mu0",
-    "µ": "mu0",
-    "µ0": "mu0",
-    "μ": "mu0",
-    "μ0": "mu0",
-    "fn": "Fz",
-    "n": "Fz",
-    "force": "Fz",
-    "normalforce": "Fz",
-    "load": "Fz",
-    "normalload": "Fz",
-    "kx": "k",
-    "kt": "k",
-    "ktangential": "k",
-    "stiffness": "k",
-    "tangentialstiffness": "k",
-    "contactstiffness": "k",
-    "y": "y0",
-    "amplitude": "y0",
-    "ampl": "y0",
-    "amp": "y0",
-    "a": "y0",
-    "a0": "y0",
-    "w": "omega",
-    "om": "omega",
-    "ω": "omega",
-    "angularfrequency": "omega",
-    "angularvelocity": "omega",
-    "freq": "f",
-    "frequency": "f",
-    "hz": "f",
-    "f0": "f",
-    "v": "v0",
-    "vo": "v0",
-    "yo": "y0",
-    "muo": "mu0",
-    "wo": "omega",
-    "fo": "f",
-    "vx": "v0",
-    "speed": "v0",
-    "velocity": "v0",
-    "slidingspeed": "v0",
-    "slidingvelocity": "v0",
+    synonym: name
+    for name, synonyms in {
+        "mu0": "mu mus muk mucoulomb frictioncoefficient coefficientoffriction cof µ µ0 μ μ0 muo",
+        "Fz": "fn n force normalforce load normalload",
+        "k": "kx kt ktangential stiffness tangentialstiffness contactstiffness",
+        "y0": "y amplitude ampl amp a a0 yo",
+        "omega": "w om ω angularfrequency angularvelocity wo",
+        "f": "freq frequency hz f0 fo",
+        "v0": "v vo vx speed velocity slidingspeed slidingvelocity",
+    }.items()
+    for synonym in synonyms.split()
 }
 _SYNONYMS |= {name.lower(): name for name in NAMES}
 # names that people expect, or former names -> the present name
@@ -134,6 +95,27 @@ def unknown_name(name: str, allowed: Iterable[str]) -> str:
 _LISTED, _COMPARED = 20, 100
 # "k in N/mm", "k / (N/mm)", "k, N/mm": forms from standards for tables
 _WITH_UNIT = re.compile(r"(\w+)(?: ?/ ?| in |, ?)(\S.*)")
+
+
+# closing bracket -> its opening bracket
+_OPENING = {"]": "[", ")": "("}
+
+
+def split_unit(column: str) -> tuple[str, str | None]:
+    """Return name and unit of a header such as ``k [N/mm]`` or ``k (N/mm)``; the unit is None if
+    there are no brackets.
+
+    >>> split_unit("k [N/mm]"), split_unit("v0")
+    (('k', 'N/mm'), ('v0', None))
+    """
+    text = column.strip()
+    closing = text[-1:]
+    if closing not in _OPENING:
+        return text, None
+    name, opening, unit = text[:-1].rpartition(_OPENING[closing])
+    if not opening or closing in unit:
+        return text, None
+    return name.strip(), unit.strip()
 
 
 def heading(cell: str, input_of: Mapping[str, str]) -> str:

@@ -15,11 +15,10 @@ import numpy as np
 
 from mumacro.errors import TextError
 from mumacro.inputs.account import Account, Rows, names_statistics, unclosed
-from mumacro.inputs.cells import BLANKS, MOST_COLUMNS, numbers_of
+from mumacro.inputs.cells import BLANKS, MOST_COLUMNS, Cell, Signs, numbers_of
 from mumacro.inputs.decoding import LONGEST, NAMES, Piece, Text, byte_pieces
 from mumacro.inputs.layout import LOOKED_AT, ColumnNames, Dialect
 from mumacro.inputs.names import absent, find_heads
-from mumacro.inputs.numbers import Cell, Signs
 from mumacro.inputs.units import in_si, too_large_in_si
 from mumacro.inputs.workbooks import BEGIN, SEP, read_sheet
 from mumacro.kernel.arrays import Array
@@ -100,7 +99,7 @@ class TextTable:
         places = ", ".join(map(str, lines))
         words += [f"units in line{'s' * (len(lines) > 1)} {places}"] if lines else []
         words += [f"rows {account.first}..{account.last}"] if account.last else []
-        units = (f"{name} [{account.units.unit(i)}]" for i, name in account.units.inputs.items())
+        units = (f"{name} [{unit}]" for name, unit in account.units.of_inputs().items())
         again = headers_left_out(sorted(account.repeated))
         return f"{self._sheets}{', '.join(words)}; {', '.join(units)}{again}"
 
@@ -235,7 +234,7 @@ def read_numbers(
             wrong.append((lines[j], f"line {lines[j]}: {name} {fault}"))
     if wrong:
         raise _wrong_rows(sorted(wrong, key=lambda one: one[0]), lines, dialect)
-    units = {name: account.units.unit(i) for name, (i, _) in columns.items()}
+    units = account.units.of_inputs()
     return TableOfNumbers(si, as_written, units, lines, skipped, table.read_as)
 
 

@@ -248,29 +248,11 @@ def too_large_in_si(values: Array, si: Array) -> dict[int, str]:
 
 # --- a unit as people and programs write it -------------------------------------------------------
 
-_PREFIXES = {
-    "": "",
-    "pico": "p",
-    "nano": "n",
-    "micro": "u",
-    "milli": "m",
-    "centi": "c",
-    "deci": "d",
-    "deca": "da",
-    "kilo": "k",
-    "mega": "M",
-    "giga": "G",
-    "tera": "T",
-}
-_BASES = {
-    "metre": "m",
-    "meter": "m",
-    "newton": "N",
-    "hertz": "Hz",
-    "pascal": "Pa",
-    "second": "s",
-    "radian": "rad",
-}
+# words of a unit, in lower case -> their symbols
+_PREFIXES = {"": "", "pico": "p", "nano": "n", "micro": "u", "milli": "m", "centi": "c"}
+_PREFIXES |= {"deci": "d", "deca": "da", "kilo": "k", "mega": "M", "giga": "G", "tera": "T"}
+_BASES = {"metre": "m", "meter": "m", "newton": "N", "hertz": "Hz", "pascal": "Pa"}
+_BASES |= {"second": "s", "radian": "rad"}
 #: names of a unit, in lower case -> its symbol
 _NAMED = {
     f"{prefix}{base}{plural}": short + symbol
@@ -278,50 +260,30 @@ _NAMED = {
     for base, symbol in _BASES.items()
     for plural in ("", "s")
 } | {
-    "sec": "s",
-    "secs": "s",
-    "minute": "min",
-    "minutes": "min",
-    "hr": "h",
-    "hour": "h",
-    "hours": "h",
-    "micron": "um",
-    "microns": "um",
-    "angstrom": "Å",
-    "angstroms": "Å",
-    "inch": "in",
-    "inches": "in",
-    "foot": "ft",
-    "feet": "ft",
-    "mils": "mil",
-    "thou": "mil",
-    "kp": "kgf",
-    "gram_force": "gf",
-    "force_gram": "gf",
-    "force_kilogram": "kgf",
-    "kilogram_force": "kgf",
-    "kilopond": "kgf",
-    "force_pound": "lbf",
-    "pound_force": "lbf",
-    "force_ounce": "ozf",
-    "ounce_force": "ozf",
-    "dyne": "dyn",
-    "degree": "deg",
-    "degrees": "deg",
-    "percent": "%",
-    "pct": "%",
-    "permille": "‰",
-    "revolution": "rev",
-    "revolutions": "rev",
-    "turn": "rev",
-    "turns": "rev",
-    "cycle": "rev",
-    "cycles": "rev",
-    "kmh": "km/h",
-    "kph": "km/h",
-    "ips": "in/s",
-    "revolutions_per_minute": "rpm",
-    "revolution_per_minute": "rpm",
+    name: symbol
+    for symbol, names in {
+        "s": "sec secs",
+        "min": "minute minutes",
+        "h": "hr hour hours",
+        "um": "micron microns",
+        "Å": "angstrom angstroms",
+        "in": "inch inches",
+        "ft": "foot feet",
+        "mil": "mils thou",
+        "kgf": "kp force_kilogram kilogram_force kilopond",
+        "gf": "gram_force force_gram",
+        "lbf": "force_pound pound_force",
+        "ozf": "force_ounce ounce_force",
+        "dyn": "dyne",
+        "deg": "degree degrees",
+        "%": "percent pct",
+        "‰": "permille",
+        "rev": "revolution revolutions turn turns cycle cycles",
+        "km/h": "kmh kph",
+        "in/s": "ips",
+        "rpm": "revolutions_per_minute revolution_per_minute",
+    }.items()
+    for name in names.split()
 }
 _FACTOR = re.compile(r"([^\d^+-]+)\^?([+-]?\d)?", re.ASCII)
 _MU = str.maketrans("µμ", "uu")
@@ -392,27 +354,6 @@ def belongs_to_value(word: str) -> bool:
         or ".." in plain
         or plain in ("+-", "-", "–")
     )
-
-
-# closing bracket -> its opening bracket
-_OPENING = {"]": "[", ")": "("}
-
-
-def split_unit(column: str) -> tuple[str, str | None]:
-    """Return name and unit of a header such as ``k [N/mm]`` or ``k (N/mm)``; the unit is None if
-    there are no brackets.
-
-    >>> split_unit("k [N/mm]"), split_unit("v0")
-    (('k', 'N/mm'), ('v0', None))
-    """
-    text = column.strip()
-    closing = text[-1:]
-    if closing not in _OPENING:
-        return text, None
-    name, opening, unit = text[:-1].rpartition(_OPENING[closing])
-    if not opening or closing in unit:
-        return text, None
-    return name.strip(), unit.strip()
 
 
 # an amplitude in the terms of vibration measurement: from zero to the peak

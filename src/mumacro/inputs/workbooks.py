@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from mumacro.errors import TextError, missing
-from mumacro.inputs.numbers import evidence
+from mumacro.inputs.cells import evidence
 
 # other zip files, by the beginning of their first member or of the list of their members
 _OPEN_DOCUMENT = b"mimetypeapplication/vnd.oasis.opendocument"

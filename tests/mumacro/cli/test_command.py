@@ -20,8 +20,8 @@ from mumacro.cli.main import COMMANDS, main
 from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import Cases
 from mumacro.inputs.fields import ENDS, NAMES, SI
-from mumacro.inputs.names import suggestion
-from mumacro.inputs.units import UNITS_OF, scale_of, split_unit
+from mumacro.inputs.names import split_unit, suggestion
+from mumacro.inputs.units import UNITS_OF, scale_of
 from mumacro.outputs.tabulated import Tabulated
 from mumacro.stiffness import GEOMETRIES, contact_of
 from mumacro.validity import rows_of

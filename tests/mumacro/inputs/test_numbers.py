@@ -5,7 +5,8 @@ import pytest
 
 from mumacro import InputError
 from mumacro.errors import TextError
-from mumacro.inputs.numbers import Cell, Signs, check_signs, read_number
+from mumacro.inputs.cells import Cell, Signs
+from mumacro.inputs.numbers import check_signs, read_number
 
 
 @pytest.mark.parametrize(

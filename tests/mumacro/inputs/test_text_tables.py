@@ -22,11 +22,10 @@ from hypothesis import strategies as st
 from mumacro.errors import InputError, TextError
 from mumacro.fits.fit import fit
 from mumacro.fits.measured_points import read_points
-from mumacro.inputs.cells import BLANKS, GAPS, numbers_of, read_cell
+from mumacro.inputs.cells import BLANKS, GAPS, Signs, evidence, numbers_of, read_cell
 from mumacro.inputs.decoding import Text, encoding_of
 from mumacro.inputs.layout import ColumnNames, Dialect
 from mumacro.inputs.names import absent
-from mumacro.inputs.numbers import Signs, evidence
 from mumacro.inputs.text_tables import TableOfNumbers, read_numbers
 from mumacro.inputs.units import Scale
 from tests.support.comparing import close
@@ -127,6 +126,11 @@ def test_the_rows_that_are_named_are_read(rigs: Path, name: str, rows: tuple[int
     points = read_points(rigs / name, Dialect(rows=rows))
     assert points.columns["v0"].tolist() == close(V0, rel=1e-12)
     assert points.lines == [*range(rows[0], rows[1] + 1)]
+
+
+def test_units_between_the_rows_that_are_named_are_refused() -> None:
+    text = "v0,mu_macro\n10,0.2\n# v0: speed [mm/s]\n20,0.3\n"
+    assert "line 3: v0 is in mm/s, the rows before are in m/s" in str(refused(text, rows=(2, 4)))
 
 
 def test_each_of_two_segments_is_read_with_its_own_units(rigs: Path) -> None:
