@@ -608,10 +608,10 @@ def test_a_motion_is_in_the_address_and_the_history(open_page: Any) -> None:
     assert page.text("[for=motion-y] small") == ""  # it would say no more than the text
     back(page, -2)
     assert page.value("#motion-y") == "2 um"
-    assert page.value("#motion-unknown") == "v0"
+    assert page.value("#motion-unknown") == "y.amplitude"
     assert page.number("#motion-values dd") == first
     back(page)
-    assert page.value("#motion-y") == ""
+    assert page.value("#motion-y") == "2 µm"
     assert page.find("#motion").is_displayed()
     back(page, 3)
     assert (page.value("#motion-y"), page.value("#motion-unknown")) == ("3 um @ 30 deg", "k")
@@ -619,7 +619,7 @@ def test_a_motion_is_in_the_address_and_the_history(open_page: Any) -> None:
 
 @pytest.mark.parametrize(
     ("address", "words", "field"),
-    [("", "f=20kHz v0=10mm/s", "field-mu0"), ("#motion=any", "--x 2µm@90deg", "motion-x")],
+    [("", "f=20kHz v0=10mm/s", "field-mu0"), ("#motion=any", "--y 2µm", "motion-y")],
 )
 def test_what_has_no_number_has_no_copy_but_its_link(
     open_page: Any, address: str, words: str, field: str

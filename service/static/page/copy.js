@@ -50,7 +50,7 @@ export function textsOf(state) {
 
 /** The texts of any motion, by name. */
 export function motionTexts(state, answer) {
-  const [inputs, chosen] = apart(motionOf(state, answer), ["contact", ...Object.keys(PARTS)]);
+  const [inputs, chosen] = apart(motionOf(state, answer), ["contact", ...PARTS]);
   const body = { ...inputs, ...chosen };
   return {
     link: page() + toAddress(state),

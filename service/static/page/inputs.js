@@ -3,7 +3,7 @@
 import { dials } from "./dials.js";
 import { $, attribute, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
-import { inputsOf } from "./state.js";
+import { inputsOf, motionFrom } from "./state.js";
 import {
   about,
   around,
@@ -12,6 +12,7 @@ import {
   numberOf,
   pageOf,
   prose,
+  show,
   unitAt,
   withUnit,
 } from "./words.js";
@@ -154,6 +155,16 @@ export function inputsPanel(store, moved) {
     stepped = { name, value, text: store.state[name] };
   }
 
+  /** Any motion begins with the case, without deviations, and asks what halves µ₀. */
+  function anyMotion() {
+    const { state } = store;
+    const name = inputsOf(state)[3];
+    const { value, unit, std } = answer?.inputs[name] ?? {};
+    const text = std ? inUnit(name, value, unit ?? undefined) : state[name];
+    const mu0 = numberOf(answer?.inputs.mu0);
+    return { ...motionFrom(state, text), ...(mu0 && { motion_target: show(mu0 / 2) }) };
+  }
+
   /** What is chosen of the oscillation: a direction, or any motion. */
   const oscillation = () => (store.state.motion === "any" ? "any" : store.state.direction);
 
@@ -209,7 +220,7 @@ export function inputsPanel(store, moved) {
     [answer, known] = [reply, faults];
     const { contact, direction } = store.state;
     const take = (way) =>
-      store.change(way === "any" ? { motion: way } : { motion: "one", direction: way });
+      store.change(way === "any" ? anyMotion() : { motion: "one", direction: way });
     const without = (kind) => about.impossible[kind];
     const reasons = (names, kind) =>
       Object.fromEntries(names.map((name) => [name, without(kind(name))]).filter(([, why]) => why));

@@ -8,7 +8,7 @@ import { html, nothing, render } from "../lib/lit-html.js";
 import { list } from "./meanings.js";
 import { Plot } from "./plot.js";
 import { post } from "./service.js";
-import { PARTS, inputsOf, motionOf, partsOf, uncertainOf } from "./state.js";
+import { PARTS, inputsOf, motionOf, partsOf, startState, uncertainOf } from "./state.js";
 import {
   about,
   asTyped,
@@ -18,6 +18,7 @@ import {
   friction,
   inUnit,
   left,
+  middleOf,
   percent,
   prefixed,
   prose,
@@ -94,7 +95,7 @@ export function motionPanel(store, moved, copy) {
   );
   const faulty = () => [...new Set([...faults.keys()].map((name) => name.split(",")[0]))];
   const mended = () =>
-    Object.fromEntries(faulty().map((name) => [name, PARTS[name] || about.start[name]]));
+    Object.fromEntries(faulty().map((name) => [name, startState()[name] || undefined]));
   const targets = new Channel(
     (body) => post("v1/solve-for", body),
     (reply, body) => {
@@ -119,7 +120,7 @@ export function motionPanel(store, moved, copy) {
   }
 
   /** Whether a remark stands below the field of an oscillation. */
-  const isDoubt = ({ row, field: one }) => row === "units" && Object.hasOwn(PARTS, one);
+  const isDoubt = ({ row, field: one }) => row === "units" && PARTS.includes(one);
 
   /** A doubt about an oscillation as it is typed, in the words of the service. */
   function doubted(name) {
@@ -151,6 +152,21 @@ export function motionPanel(store, moved, copy) {
       <p id=${`motion-note-${name}`} class="note">${note}</p>
     </div>`;
   }
+
+  /** A motion with a speed at which it carries the body by itself. */
+  const conveyor = () =>
+    store.change({
+      ...about.start,
+      contact: "spring",
+      x: "2 µm @ 90 deg",
+      y: "",
+      normal: "5 N @ -90 deg",
+      motion_unknown: "v0",
+      motion_target: "0",
+    });
+  const example = html`<p class="ways">
+    Example: <button type="button" id="conveyor" @click=${conveyor}>conveyor</button>
+  </p>`;
 
   /** The number of the motion, and what it says, in the card of the answer. */
   function headline(known, error) {
@@ -239,10 +255,12 @@ export function motionPanel(store, moved, copy) {
       : html`<li>${prose(reason ?? `No value gives that${range}.`)}</li>`;
   }
 
-  /** Deviations of the inputs, which a motion has not. */
+  /** Deviations of the inputs, or an interval of k, which a motion has not. */
   function withoutDeviations() {
     const body = motionOf(store.state, answer);
     const names = uncertainOf(store.state, answer, body);
+    const middle = body.k === answer?.inputs.k?.value && middleOf(answer);
+    if (middle) return whole(`Computed at ${middle}, the middle of the interval.`);
     if (!names.length) return "";
     const symbols = names.map((name) => about.inputs[name].symbol).join(", ");
     return `Computed without the standard deviation (±) of ${symbols}: a motion carries none.`;
@@ -250,7 +268,7 @@ export function motionPanel(store, moved, copy) {
 
   function draw() {
     const { state } = store;
-    render(Object.keys(PARTS).map(field), $("motion-form"));
+    render([...PARTS.map(field), example], $("motion-form"));
     if (motion) numbers();
     render(roots(), $("motion-roots"));
     tell();
@@ -279,7 +297,7 @@ export function motionPanel(store, moved, copy) {
   /** Why there is no newer number; what is wrong with a field stands beside it. */
   function tell() {
     const names = faulty();
-    const fields = [...inputsOf(store.state), ...Object.keys(PARTS)];
+    const fields = [...inputsOf(store.state), ...PARTS];
     const told = names.length > 0 && names.every((name) => fields.includes(name));
     const check = `check ${names.map(called).join(", ")}`;
     const shown = (name) => {

@@ -26,22 +26,30 @@ const CHOICES = {
   side: ["values", "bars", "target"],
   panel: ["none", "stiffness", "fit"],
   motion_unknown: [
+    "y.amplitude",
+    "y.phase",
+    "x.amplitude",
+    "x.phase",
+    "normal.amplitude",
+    "normal.phase",
     "v0",
     "k",
     "f",
-    "x.amplitude",
-    "x.phase",
-    "y.amplitude",
-    "y.phase",
-    "normal.amplitude",
-    "normal.phase",
   ],
 };
-/** The oscillations of any motion, as texts: at the start those of a conveyor, which has a speed at
- * which it carries itself. */
-export const PARTS = { x: "2 µm @ 90 deg", y: "", normal: "5 N @ -90 deg" };
+/** The oscillations of any motion, and the one that each direction is. */
+export const PARTS = ["x", "y", "normal"];
+export const PART_OF = { along: "x", across: "y", normal: "normal" };
+const UNSHAKEN = { x: "", y: "", normal: "" };
 /** Texts beside the inputs; an empty one is left to the service. */
-const TEXTS = { from: "", to: "", exponent: "", target: "0.5", ...PARTS, motion_target: "0" };
+const TEXTS = {
+  from: "",
+  to: "",
+  exponent: "",
+  target: "0.5",
+  ...UNSHAKEN,
+  motion_target: "0.15",
+};
 
 /** The inputs of the usual case, by name, as the service gives them. */
 let usual = {};
@@ -53,6 +61,15 @@ export const startState = () => ({
   ...Object.fromEntries(Object.entries(CHOICES).map(([name, [first]]) => [name, first])),
   ...TEXTS,
   ...usual,
+  y: usual.y0,
+});
+
+/** Any motion with the oscillation of a case alone, whose amplitude is this text. */
+export const motionFrom = ({ direction }, amplitude) => ({
+  motion: "any",
+  ...UNSHAKEN,
+  [PART_OF[direction]]: amplitude,
+  motion_unknown: `${PART_OF[direction]}.amplitude`,
 });
 
 /** The state as the part of an address behind "#": the inputs, and what is not as at the start. */
@@ -120,11 +137,14 @@ export function exactCase(state, answer, without = []) {
 
 /** The oscillations that a contact can have: the load of a ball stays as it is. */
 export const partsOf = ({ contact }) =>
-  Object.keys(PARTS).filter((name) => name !== "normal" || contact !== "ball");
+  PARTS.filter((name) => name !== "normal" || contact !== "ball");
 
-/** Any motion: the case without y0 and direction, and the oscillations that are given. */
+/** Any motion: the case without y0 and direction, and the oscillations that are given; of an
+ * interval of k its middle. */
 export function motionOf(state, answer, without = []) {
   const { direction: _, ...body } = exactCase(state, answer, ["y0", "Fz_amplitude", ...without]);
+  const { high, value } = answer?.inputs.k ?? {};
+  if (high !== undefined && body.k === answer.state.k) body.k = value;
   const parts = partsOf(state).filter((name) => state[name].trim());
   return { ...body, ...Object.fromEntries(parts.map((name) => [name, state[name]])) };
 }
