@@ -10,6 +10,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mumacro import plotting
 from mumacro.errors import InputError
@@ -157,26 +158,33 @@ def map_of(
     surrogate: Surrogate, contact: str = "spring", direction: str = "across"
 ) -> dict[str, Any]:
     """Return ``map.json``: mu~ on a grid in whole numbers for a contact and direction, rows of
-    constant y~ from below, its border, and what the page draws: levels, colours, places of numbers
+    constant y~ from below, its borders, and what the page draws: levels, colours, places of numbers
     and regimes."""
     kind = kind_of(contact, direction)
     ratio, v_crit = surrogate.map_of(kind, _WIDTH, _HEIGHT)
     v, y = plotting.speeds(_WIDTH), plotting.amplitudes(_HEIGHT, kind.normal)
     fine = plotting.amplitudes(4 * _HEIGHT, kind.normal)
-    border = np.column_stack((surrogate.v_tilde_crit(fine, **kind.names), fine)).tolist()
+    border = np.column_stack((surrogate.v_tilde_crit(fine, **kind.names), fine))
     on_map = np.interp(v, v_crit, np.linspace(0.0, 1.0, _HEIGHT))
-    regimes = zip(plotting.AREAS, surrogate.regimes_on_map(kind), strict=True)
+    areas = surrogate.regimes_on_map(kind)
+    reverse = surrogate.reverse_slip_on_map(kind, _WIDTH)
     return {
         "v_tilde": {"start": v[0], "stop": v[-1], "n": _WIDTH, "log": True},
         "y_tilde": {"start": y[0], "stop": y[-1], "n": _HEIGHT, "log": not kind.normal},
         "unit": _UNIT,
         "mu_ratio": np.rint(ratio / _UNIT).astype(int).ravel().tolist(),
-        "border": [[float(f"{x:.6g}") for x in place] for place in border],
+        "border": _written(border),
+        "reverse": [] if reverse is None else _written(np.column_stack(reverse)),
         "levels": plotting.LEVELS,
         "colours": plotting.band_colours(),
-        "labels": plotting.label_places(ratio, on_map),
-        "areas": [[*place, plotting.REGIMES[name].words] for place, name in regimes],
+        "labels": plotting.label_places(ratio, on_map, areas.values()),
+        "areas": [[*place, plotting.REGIMES[name].words] for name, place in areas.items()],
     }
+
+
+def _written(places: NDArray[np.float64]) -> list[list[float]]:
+    """Return places (n, 2) in six digits."""
+    return [[float(f"{x:.6g}") for x in place] for place in places.tolist()]
 
 
 def _scales(units: Mapping[str, Scale]) -> dict[str, list[float]]:

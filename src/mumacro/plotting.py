@@ -37,7 +37,7 @@ LEVELS = (0.01, 0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 LABELLED = (0.01, 0.03, 0.1, 0.3, 0.5, 0.7, 0.9, 0.95, 0.99)
 #: colours of every map, evenly spaced over the areas between two contours; darker means less
 #: friction, also in black and white
-COLOURS = ("#35609f", "#3a86b6", "#58aec0", "#90cfbb", "#cbe8b9", "#fff9d6")
+COLOURS = ("#14285c", "#2f6aa8", "#4a9dbd", "#86c9b7", "#c6e5b3", "#fff9d6")
 INK, BLUE, RED, GREY = "#16202c", "#0b5cad", "#a3242b", "#6b7683"
 #: colour of all borders, readable on light and on dark paper
 BORDER = "#c8323c"
@@ -79,8 +79,9 @@ _TO_BORDER = 0.4
 _SIDE = 0.05  # part of the map at each side without labels
 _LEGEND_WIDTH = 72  # characters of a legend above its axes
 _ARROWS = 16  # number of arrows of the force along a path
-#: places where the map names the regime, as fractions of its width and height
-AREAS = ((0.14, 0.735), (0.8, 0.12))
+#: places where the map names the regime, as fractions of its width and height, unless an earlier
+#: one has it
+AREAS = ((0.14, 0.735), (0.8, 0.12), (0.19, 0.25))
 
 
 #: the panels of a picture, as ``subplots`` of matplotlib takes them: forces and path; curves and
@@ -411,16 +412,18 @@ def heights(ratio: Array, level: float) -> Array:
     return np.where(first == 0, 0.0, np.where(first == len(ratio), 1.0, share))
 
 
-def label_places(ratio: Array, border: Array) -> list[tuple[float, float, float]]:
+def label_places(
+    ratio: Array, border: Array, areas: Iterable[tuple[float, float]] = AREAS
+) -> list[tuple[float, float, float]]:
     """Return the places of the numbers of the contours: (level, fraction of the width, fraction of
     the height).
 
     A number is at the point of its line that is farthest from the other lines, from the ``border``
-    (n,) (a height at each speed), from the names of the regimes and from the numbers that are
-    already there.  A line that is not on the map has no number.
+    (n,) (a height at each speed), from the names of the regimes at ``areas`` and from the numbers
+    that are already there.  A line that is not on the map has no number.
     """
     across = np.linspace(0.0, 1.0, ratio.shape[1])
-    words = [(u + aside, w) for u, w in AREAS for aside in (-0.12, 0.0, 0.12)]  # a name is wide
+    words = [(u + aside, w) for u, w in areas for aside in (-0.12, 0.0, 0.12)]  # a name is wide
     lines = {level: heights(ratio, level) for level in LEVELS}
     places: list[tuple[float, float, float]] = []
     for level in LABELLED:
@@ -462,13 +465,15 @@ def plot_map(
     *,
     marks: Marks | None = None,
     direction: str = "across",
-    areas: Sequence[str] = (),
+    areas: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+    reverse: tuple[Array, Array] | None = None,
     title: str = "",
 ) -> Any:
     """Draw mu~ (m, n) over :func:`speeds` and :func:`amplitudes`, with the border of continuous
     sliding ``v_crit`` (m,), and with cases as ``marks``.
 
-    ``direction`` is the direction of the oscillation; ``areas`` are the regimes at :data:`AREAS`.
+    ``direction`` is the direction of the oscillation; ``areas`` are the regimes with the places of
+    their names, of :data:`AREAS`; ``reverse`` are (v~, y~) of the border of reverse slip.
     """
     ax, normal = axes_for(ax), direction == "normal"
     v, y = speeds(ratio.shape[1]), amplitudes(len(ratio), normal)
@@ -483,6 +488,8 @@ def plot_map(
         label="border of continuous sliding",
         path_effects=[_loaded("patheffects").withStroke(linewidth=3.5, foreground="white")],
     )
+    if reverse is not None:
+        ax.plot(*reverse, _LINES["border of reverse slip"], color=BORDER, path_effects=halo)
     ax.grid(visible=False)
     ax.set(xscale="log", yscale="linear" if normal else "log", xlim=V_RANGE, ylim=(y[0], y[-1]))
     speed = r"$\tilde v = v_0 k / (\mu_0 F_z \omega)$"
@@ -499,13 +506,13 @@ def plot_map(
     border_heights = np.interp(
         np.log(v), np.log(np.maximum(v_crit, 1e-300)), np.linspace(0.0, 1.0, len(y))
     )
-    places = label_places(ratio, border_heights)
+    places = label_places(ratio, border_heights, areas.values())
     manual = [place(u, w, normal) for _, u, w in places]
     for text in ax.clabel(
         lines, levels=LABELLED, manual=manual, fmt="%g", fontsize=9.0, inline_spacing=3, colors=INK
     ):
         text.set_path_effects(halo)
-    for (u, w), name in zip(AREAS, areas, strict=False):
+    for name, (u, w) in areas.items():
         ax.annotate(
             REGIMES[name].words,
             (u, w),

@@ -176,6 +176,7 @@ class Surrogate:
             ax,
             direction=kind.names["direction"],
             areas=self.regimes_on_map(kind),
+            reverse=self.reverse_slip_on_map(kind, 281),
             title=title,
             **cases,
         )
@@ -187,13 +188,37 @@ class Surrogate:
         ratio = self.quantity("mu_ratio", v, y[:, None], **kind.names)[0]
         return ratio, self.v_tilde_crit(y, **kind.names)
 
-    def regimes_on_map(self, kind: Kind) -> list[str]:
-        """Return the regimes at ``plotting.AREAS`` of the map of a contact and direction."""
+    def regimes_on_map(self, kind: Kind) -> dict[str, tuple[float, float]]:
+        """Return the regimes on the map of a contact and direction, each with the place of its
+        name: one of ``plotting.AREAS``."""
         v, y = zip(*(plotting.place(*area, kind.normal) for area in plotting.AREAS), strict=True)
-        swing = {"Fz_amplitude" if kind.normal else "y0": np.array(y)}
+        regimes = self._regimes_at(kind, np.array(v), np.array(y))
+        return dict(reversed([*zip(map(str, regimes), plotting.AREAS, strict=True)]))
+
+    def _regimes_at(self, kind: Kind, v: Array, y: Array) -> NDArray[Any]:
+        """Return the regime at each v~ (n,) and y~ (n,)."""
         # v~ = v0 and y~ = y0
-        cases = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": np.array(v), **swing}
-        return [str(name) for name in self.evaluate(cases, **kind.names).regime]
+        cases = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": v}
+        return np.asarray(
+            self.evaluate(
+                {**cases, "Fz_amplitude" if kind.normal else "y0": y}, **kind.names
+            ).regime
+        )
+
+    def reverse_slip_on_map(self, kind: Kind, width: int) -> tuple[Array, Array] | None:
+        """Return (v~, y~) of the border between stick-slip and reverse slip on the map, (n,) each
+        with n <= ``width``; None for a contact and direction without it."""
+        if not {"stick_slip", "reverse_slip"} <= self.regimes_on_map(kind).keys():
+            return None
+        v = plotting.speeds(width)
+        low, high = (np.full(width, end) for end in plotting.Y_RANGE)
+        v = v[self._regimes_at(kind, v, high) == "reverse_slip"]
+        low, high = low[: v.size], high[: v.size]
+        for _ in range(60):
+            middle = np.sqrt(low * high)
+            beyond = self._regimes_at(kind, v, middle) == "reverse_slip"
+            low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+        return v, high
 
     def on_threads(self, threads: int | None) -> Self:
         """Return the same table, whose calls use so many threads, see :meth:`open`."""

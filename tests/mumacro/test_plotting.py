@@ -366,3 +366,4 @@ def test_neighbours_on_the_map_are_told_apart_by_everyone(seen: str) -> None:
     light = np.clip(linear @ SEEN[seen].T, 0.0, 1.0) @ np.array([0.2126, 0.7152, 0.0722])
     lightness = 116.0 * np.cbrt(light) - 16.0  # L* of CIE 1976
     assert np.diff(lightness).min() > 2.5
+    assert np.diff(lightness)[:2].min() > 8.0  # dark ones look more alike than pale ones

@@ -55,6 +55,23 @@ def test_the_map_is_the_surrogates(client: Any, surrogate: Surrogate, kind: Any)
         place = plotting.place(along, up, kind[1] == "normal")
         assert surrogate.quantity("mu_ratio", *place, **names)[0] == close(level, rel=0.06)
     assert len(data["labels"]) >= 7
+    # every regime of the map has its name once, and the border of reverse slip is where it begins
+    v_all, y_all = np.meshgrid(v[::10], y[1::10])
+    there = surrogate.evaluate(
+        {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": v_all.ravel()}
+        | {"Fz_amplitude" if kind[1] == "normal" else "y0": y_all.ravel()},
+        **names,
+    ).regime
+    assert sorted(words for _, _, words in data["areas"]) == sorted(
+        plotting.REGIMES[one].words for one in {*there}
+    )
+    reverse = np.array(data["reverse"]).reshape(-1, 2)
+    assert (len(reverse) > 100) is (kind == ("spring", "along"))
+    for side, regime in ((0.999, "stick_slip"), (1.001, "reverse_slip")):
+        near = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": reverse[:, 0]}
+        assert {*surrogate.evaluate({**near, "y0": side * reverse[:, 1]}, **names).regime} <= {
+            regime
+        }
     for along, up, words in data["areas"]:
         v_there, y_there = plotting.place(along, up, kind[1] == "normal")
         slides = v_there > surrogate.v_tilde_crit(y_there, **names)

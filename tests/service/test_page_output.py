@@ -843,7 +843,7 @@ def test_any_motion_begins_with_the_case_and_asks_what_halves_its_friction(
     page.click("#motion-target-form button")
     mu0 = float(page.value("#field-mu0"))
     assert page.value("#motion-target") == f"{mu0 / 2:g}"
-    page.wait_for("#motion-roots", "^\\s*amplitude (across|along|of the load) = ")
+    page.wait_for("#motion-roots", "^\\s*(x|y|ΔFz) amplitude = ")
     assert ("k = 1.414 N/µm, the middle of the interval" in page.text("#motion-doubt")) is (
         "k=1..2" in direction
     )
@@ -873,7 +873,7 @@ def test_a_motion_has_its_remarks(open_page: Any) -> None:
     page.click("[name=contact][value=ball]")  # whose load cannot oscillate
     assert not page.find("#motion-normal").is_enabled()
     assert page.text("#motion-status") == ""
-    assert "radius" in page.text("#motion-note-normal")
+    assert "radius" in page.find("#motion-normal").get_attribute("title")
 
 
 @pytest.mark.parametrize(
@@ -919,7 +919,7 @@ def test_any_motion_is_computed_drawn_and_solved(open_page: Any) -> None:
     page.choose("#motion-unknown", "x.amplitude")
     assert page.is_old("#motion-roots")
     page.type("#motion-target", "0.15")
-    page.wait_for("#motion-roots", "amplitude along = ")
+    page.wait_for("#motion-roots", "x amplitude = ")
     assert not page.is_old("#motion-roots")
     page.click("#motion-roots button")
     assert page.value("#motion-x").endswith(" @ 90 deg")

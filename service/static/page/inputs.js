@@ -31,7 +31,10 @@ const HOW =
  */
 function choice(name, words, chosen, take, reasons) {
   const one = (value) => html`
-    <label title=${reasons[value] ?? nothing}>
+    <label
+      title=${reasons[value] ?? nothing}
+      @click=${() => reasons[value] && write("chosen", reasons[value])}
+    >
       <input
         type="radio"
         name=${name}
@@ -102,13 +105,13 @@ export function inputsPanel(store, moved) {
           .value=${text}
         />
         <p id=${`note-${name}`} class="note">${below}</p>
-        ${name === "k" && !rigid ? ways(numberOf(answer?.inputs.k)) : nothing}
+        ${name === "k" && !rigid ? ways(answer?.inputs.k) : nothing}
       </div>
     `;
   }
 
   /** Where k comes from, which is the input that nobody knows. */
-  function ways(k) {
+  function ways({ value: k, std, high } = {}) {
     const tool = (panel, words, title) => html`
       <button
         title=${title}
@@ -125,9 +128,9 @@ export function inputsPanel(store, moved) {
       <button
         id="as-interval"
         type="button"
-        title="Ten per cent less to ten per cent more, to be changed"
-        ?disabled=${!(k > 0)}
-        @click=${() => store.change({ k: around(k) })}
+        title="From k less its deviation, or 10 %, to k more that, to be changed"
+        ?disabled=${!(k > 0) || high !== undefined}
+        @click=${() => store.change({ k: around(k, std ? std / k : undefined) })}
       >
         interval
       </button>
@@ -168,15 +171,15 @@ export function inputsPanel(store, moved) {
   /** What is chosen of the oscillation: a direction, or any motion. */
   const oscillation = () => (store.state.motion === "any" ? "any" : store.state.direction);
 
-  /** The set-up as a drawing and in words, with the reasons for what cannot be chosen. */
-  function sketch(reasons) {
+  /** The set-up as a drawing and in words. */
+  function sketch() {
     const { contact } = store.state;
     const way = oscillation();
     for (const part of $("sketch").querySelectorAll(".body, .motion"))
       part.toggleAttribute("hidden", !part.matches(`.body.${contact}, .motion.${way}`));
     const words = `${about.choices.contact[contact]}, ${about.choices.direction[way] ?? ANY}`;
     attribute("sketch", "aria-label", `The set-up: ${words}`);
-    write("chosen", [`${words[0].toUpperCase()}${words.slice(1)}.`, ...reasons].join(" "));
+    write("chosen", `${words[0].toUpperCase()}${words.slice(1)}.`);
   }
 
   function fields() {
@@ -233,7 +236,7 @@ export function inputsPanel(store, moved) {
       ],
       $("choices"),
     );
-    sketch(new Set([...Object.values(ball), ...Object.values(ways)]));
+    sketch();
     fields();
   };
 }

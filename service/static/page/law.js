@@ -2,7 +2,7 @@
 import { Channel } from "./ask.js";
 import d3 from "./d3.js";
 import { $, attribute, write } from "./dom.js";
-import { endsOf, inLine } from "./number.js";
+import { endsOf, inLine, peakOf } from "./number.js";
 import { Plot, save } from "./plot.js";
 import { post } from "./service.js";
 import { caseAround, inputsOf } from "./state.js";
@@ -32,8 +32,11 @@ const POSITIVE = ["mu0", "Fz", "k"]; // inputs that cannot be 0
 /** Where the law is drawn while no range is typed [SI]. */
 function usualRange(state, { inputs, limits }) {
   const { along, scale } = state;
-  const border = along === "v0" ? limits?.v0_crit : null;
-  const marks = [numberOf(inputs[along]), border].filter((one) => one > 0 && Number.isFinite(one));
+  // where the law of a soft and of a rigid contact bends
+  const bend = state.contact === "rigid" ? peakOf(inputs) : limits?.v0_crit;
+  const marks = [numberOf(inputs[along]), along === "v0" ? bend : null].filter(
+    (one) => one > 0 && Number.isFinite(one),
+  );
   let [low, high] = about.inputs[along].range.map((exponent) => 10 ** exponent);
   if (marks.length) {
     const exponents = marks.map(Math.log10);

@@ -14,17 +14,16 @@ const DIGITS = 27; // pixels of a number of the legend
 const NEAR = 7; // pixels from the user's point, within which its own number is read
 const SIDES = 118; // pixels beside the map, with the numbers of its axes
 
-/** The relative deviation of a product of powers of inputs; 0 where none has one. */
-function deviationOf(inputs, names) {
-  const relative = names.map((name) =>
-    inputs[name]?.std ? inputs[name].std / inputs[name].value : 0,
-  );
-  return Math.hypot(...relative);
-}
+/** The relative deviation of an input; 0 where it has none. */
+const deviationOf = (one) => (one?.std ? one.std / one.value : 0);
 
 const PALE = 0.5; // of µ/µ₀, from which the map is so pale that words on it are dark
-const SPEED = ["v0", "k", "mu0", "Fz", "f"]; // what ṽ depends on
-const AMPLITUDE = { y0: ["y0", "k", "mu0", "Fz"], Fz_amplitude: ["Fz_amplitude", "Fz"] };
+/** The powers of the inputs in ṽ, and in ỹ by the input that is shaken. */
+const SPEED = { v0: 1, k: 1, mu0: -1, Fz: -1, f: -1 };
+const AMPLITUDE = {
+  y0: { y0: 1, k: 1, mu0: -1, Fz: -1 },
+  Fz_amplitude: { Fz_amplitude: 1, Fz: -1 },
+};
 
 /** `moved({ name: value [SI] })` takes values of the point; `loaded()` hears of a new map. */
 export function mapPanel(store, moved, loaded) {
@@ -92,6 +91,7 @@ export function mapPanel(store, moved, loaded) {
         .attr("d", outline(shade));
     });
     plot.rimmed(plot.shape(map.border.filter(([v, y]) => v > 0 && y > 0)), "border");
+    if (map.reverse.length) plot.rimmed(plot.shape(map.reverse), "border reverse");
     const at = (u, w) => [box.x + u * box.width, box.y + (1 - w) * box.height];
     // a number gives way to the name of a regime
     for (const [u, w, words] of map.areas)
@@ -198,14 +198,28 @@ export function mapPanel(store, moved, loaded) {
     text("1", box.x + box.width, top + 20);
   }
 
+  const powers = () => [SPEED, AMPLITUDE[amplitude()]];
   const deviations = (inputs) =>
-    [SPEED, AMPLITUDE[amplitude()]].map((names) => deviationOf(inputs, names));
+    powers().map((one) =>
+      Math.hypot(...Object.keys(one).map((name) => deviationOf(inputs[name]))),
+    );
 
-  /** The user's point, with a bar for its deviation or for the interval of k. */
+  /** How far the deviation of each input moves a place of the map, in pixels; k, µ₀ and Fz move it
+   * along both axes at once. */
+  function steps(place, inputs) {
+    const scales = [plot.x, plot.y];
+    const step = (name) =>
+      powers().map((one, i) => {
+        const share = (one[name] ?? 0) * deviationOf(inputs[name]);
+        const moved = place[i] * (scales[i].base ? Math.exp(share) : 1 + share);
+        return share && place[i] > 0 ? scales[i](moved) - scales[i](place[i]) : 0;
+      });
+    return Object.keys(inputs).map(step);
+  }
+
+  /** The user's point, with an ellipse for its deviation and a bar for the interval of k. */
   function point({ v: along, y: up }, inputs) {
-    const [dv, dy] = deviations(inputs);
-    if (dv) plot.bar([along * Math.exp(-dv), up], [along * Math.exp(dv), up]);
-    if (dy && map.y_tilde.log) plot.bar([along, up * Math.exp(-dy)], [along, up * Math.exp(dy)]);
+    plot.ellipse([along, up], steps([along, up], inputs));
     const { low, high, value } = inputs.k ?? {};
     if (low && high) {
       const at = (k) => [(along * k) / value, map.y_tilde.log ? (up * k) / value : up];

@@ -35,12 +35,12 @@ const UNKNOWNS = {
   v0: "v₀",
   k: "k",
   f: "f",
-  "x.amplitude": "amplitude along",
-  "x.phase": "phase along",
-  "y.amplitude": "amplitude across",
-  "y.phase": "phase across",
-  "normal.amplitude": "amplitude of the load",
-  "normal.phase": "phase of the load",
+  "x.amplitude": "x amplitude",
+  "x.phase": "x phase",
+  "y.amplitude": "y amplitude",
+  "y.phase": "y phase",
+  "normal.amplitude": "ΔFz amplitude",
+  "normal.phase": "ΔFz phase",
 };
 /** What slips, in the words of the contact. */
 const SLIPS = {
@@ -132,7 +132,7 @@ export function motionPanel(store, moved, copy) {
     const none = !partsOf(store.state).includes(name);
     const fault = none ? undefined : faults.get(name);
     const doubt = none ? undefined : doubted(name);
-    const note = none ? about.impossible["ball normal"] : (fault ?? doubt ?? "");
+    const note = fault ?? doubt ?? "";
     const read = none ? "" : understood(name);
     return html`<div class="field ${fault ? "bad" : doubt ? "doubt" : ""}">
       <label for=${`motion-${name}`}
@@ -145,7 +145,8 @@ export function motionPanel(store, moved, copy) {
         spellcheck="false"
         aria-invalid=${String(fault !== undefined)}
         aria-describedby=${`motion-note-${name}`}
-        placeholder="none"
+        placeholder=${none ? "not modelled" : "none"}
+        title=${none ? about.impossible["ball normal"] : nothing}
         ?disabled=${none}
         .value=${none ? "" : store.state[name]}
       />

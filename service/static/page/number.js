@@ -109,6 +109,9 @@ export function sensitivities({ gradient, mu_macro: mu, inputs }) {
   });
 }
 
+/** The largest speed of the oscillation [m/s], undefined where the load is shaken. */
+export const peakOf = ({ y0, f }) => y0 && y0.value * 2 * Math.PI * f.value;
+
 /** The inputs that change µ most, as far as two digits tell, before what is said of k. */
 function deciding(answer, words) {
   const size = ([, share]) => Number(Math.abs(share).toPrecision(2));

@@ -9,6 +9,7 @@ const NARROW = 240; // pixels of a frame, in which the name of a regime has a li
 const RADIUS = 7; // pixels of the user's point
 const CAP = 5; // pixels of the cap of a bar, to either side
 const BAR = 40; // places of a bar, at which it may lie on a text
+const FLAT = 2; // pixels of half the width of an ellipse, below which it is drawn as a bar
 const FINGER = 36; // pixels from the point, within which a finger takes it
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 /** Of an input, by one press of an arrow key; with Shift. */
@@ -317,8 +318,12 @@ export class Plot {
   }
 
   /** A bar with caps for what is open about the user's point, from one place to another. */
-  bar(from, to) {
-    const ends = [from, to].map(([x, y]) => [this.x(x), this.y(y)]);
+  bar(...places) {
+    this.stroke(places.map(([x, y]) => [this.x(x), this.y(y)]));
+  }
+
+  /** A bar between two places in pixels. */
+  stroke(ends) {
     const [[left, foot], [right, top]] = ends;
     for (let i = 0; i <= BAR; i += 1)
       this.cover(left + (i / BAR) * (right - left), foot + (i / BAR) * (top - foot), 3);
@@ -326,7 +331,37 @@ export class Plot {
     const [across, down] = [foot - top, right - left].map((one) => (CAP * one) / length);
     const shown = length > 2 * RADIUS ? ends : []; // within the point there is no room
     const cap = ([x, y]) => `M${x - across} ${y - down}L${x + across} ${y + down}`;
-    this.rimmed(`${this.shape([from, to])}${shown.map(cap).join("")}`, "deviation");
+    this.rimmed(`M${left} ${foot}L${right} ${top}${shown.map(cap).join("")}`, "deviation");
+    this.open = true;
+  }
+
+  /**
+   * One standard deviation about a place: an ellipse, or a bar where that is flat.  Each step
+   * [right, down], in pixels, is the deviation of an independent cause.
+   */
+  ellipse([x, y], steps) {
+    const sum = (i, j) => steps.reduce((all, step) => all + step[i] * step[j], 0);
+    const [xx, xy, yy] = [sum(0, 0), sum(0, 1), sum(1, 1)];
+    const half = Math.hypot((xx - yy) / 2, xy);
+    const [long, short] = [1, -1].map((side) =>
+      Math.sqrt(Math.max((xx + yy) / 2 + side * half, 0)),
+    );
+    if (!(long > 0)) return;
+    const turn = Math.atan2(2 * xy, xx - yy) / 2;
+    const [cos, sin] = [Math.cos(turn), Math.sin(turn)];
+    const [left, top] = [this.x(x), this.y(y)];
+    const at = (along, across) => [
+      left + along * cos - across * sin,
+      top + along * sin + across * cos,
+    ];
+    const ends = [at(-long, 0), at(long, 0)];
+    if (short < FLAT) return this.stroke(ends);
+    for (let i = 0; i < BAR; i += 1) {
+      const angle = (2 * Math.PI * i) / BAR;
+      this.cover(...at(long * Math.cos(angle), short * Math.sin(angle)), 3);
+    }
+    const arc = `A${long} ${short} ${(turn * 180) / Math.PI} 0 1 `;
+    this.rimmed(`M${ends[0]}${arc}${ends[1]}${arc}${ends[0]}Z`, "deviation");
     this.open = true;
   }
 

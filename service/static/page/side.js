@@ -4,7 +4,7 @@ import { Channel } from "./ask.js";
 import { $, write } from "./dom.js";
 import { html, nothing, render, svg } from "../lib/lit-html.js";
 import { list } from "./meanings.js";
-import { inLine, sensitivities } from "./number.js";
+import { inLine, peakOf, sensitivities } from "./number.js";
 import { post } from "./service.js";
 import { caseAround, inputsOf, kindOf } from "./state.js";
 import {
@@ -66,7 +66,6 @@ function numbers(answer, all) {
   const lacks = about.lacks[kindOf(state)];
   const without = (name, words) =>
     lacks[name] ? [words, lacks[name]] : ["rigid contact", "it is not given for a rigid contact"];
-  const amplitude = inputs.y0?.value;
   // the service has no group that is not finite, nor ṽ where nothing oscillates
   const rigid = state.contact === "rigid";
   const still = groups.y_tilde === 0;
@@ -90,7 +89,7 @@ function numbers(answer, all) {
     [
       "peak y₀ω",
       "largest speed of the oscillation",
-      amount(amplitude && amplitude * 2 * Math.PI * inputs.f.value, "m/s", 4),
+      amount(peakOf(inputs), "m/s", 4),
       "load shaken",
       "the load is shaken, not the body",
     ],

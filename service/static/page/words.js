@@ -140,10 +140,10 @@ export function withEnds(low, high) {
   return [low > 0 && Number(from) === 0 ? show(low, 2) : from, to];
 }
 
-/** An interval of ten per cent about a stiffness [N/m], as a person types it: "0.9..1.1 N/µm". */
-export function around(k) {
-  const high = inUnit("k", 1.1 * k, unitFor("k", k), 3);
-  const low = inUnit("k", 0.9 * k, unitFor("k", k), 3);
+/** An interval of a share about a stiffness [N/m], as a person types it: "0.9..1.1 N/µm". */
+export function around(k, share = 0.1) {
+  const high = inUnit("k", (1 + share) * k, unitFor("k", k), 3);
+  const low = inUnit("k", Math.max(1 - share, 0.01) * k, unitFor("k", k), 3);
   return `${low.split(" ")[0]}..${high}`;
 }
 
