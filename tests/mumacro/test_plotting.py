@@ -10,7 +10,7 @@ import pytest
 import mumacro
 from mumacro import Surrogate, plotting
 from mumacro.fits.fitted import Fit
-from mumacro.inputs.fields import KINDS, Kind
+from mumacro.inputs.fields import KINDS, Kind, kind_of
 from mumacro.questions.law import Law
 from tests.support.cases import Case
 from tests.support.comparing import close, title_of
@@ -176,7 +176,10 @@ def test_a_regime_has_one_colour_and_mark_in_all_pictures(surrogate: Surrogate, 
         assert (shown[look.words].get_color(), shown[look.words].get_marker()) == look[1:]
     of_words = {look.words: look.colour for look in plotting.REGIMES.values()}
     on_map = [text for text in axes.texts if text.get_text() in of_words]
-    assert len(on_map) == 2
+    assert {text.get_text() for text in on_map} >= {
+        plotting.REGIMES[name].words for name in regimes - {"static"}
+    }
+    assert len(on_map) == (3 if kind == kind_of("spring", "along") else 2)
     for text in on_map:
         assert text.get_color() == of_words[text.get_text()]
 
