@@ -16,7 +16,7 @@ from mumacro.errors import InputError
 from mumacro.inputs.carried import labelled_in_si, library
 from mumacro.inputs.cases import Cases, library_of
 from mumacro.inputs.columns import is_column, read_column
-from mumacro.inputs.fields import quantity_of
+from mumacro.inputs.units import quantity_of
 from mumacro.outputs import MEMBERS
 from mumacro.outputs.answer import TEXTS, Answer
 from mumacro.outputs.evaluation import chosen

@@ -12,7 +12,7 @@ from mumacro.cli.table_format import add_format, dialect_in, fit_to, read_file, 
 from mumacro.errors import InputError
 from mumacro.fits.loop import fit_loop
 from mumacro.inputs.case import read_one
-from mumacro.inputs.layout import ColumnNames
+from mumacro.inputs.names import ColumnNames
 from mumacro.inputs.text_tables import read_numbers
 
 EXAMPLE = "mumacro fit-loop loop.csv Fz=10N --displacement x --force Ft -o loop.png"

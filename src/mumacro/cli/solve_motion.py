@@ -8,8 +8,15 @@ from mumacro.cli import common
 from mumacro.cli.common import ImpossibleError, UsageError, in_columns
 from mumacro.cli.motion import read_motion
 from mumacro.inputs.case import read
-from mumacro.inputs.fields import quantity_of
-from mumacro.inputs.units import Unit, format_number, known, parse_unit, suit_unit, tidy_zeros
+from mumacro.inputs.units import (
+    Unit,
+    format_number,
+    known,
+    parse_unit,
+    quantity_of,
+    suit_unit,
+    tidy_zeros,
+)
 from mumacro.motions.motion import PARTS
 from mumacro.motions.solve_motion import MotionSolution, solve_motion
 

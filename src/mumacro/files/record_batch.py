@@ -28,8 +28,7 @@ from mumacro.inputs.fields import (
     kind_of,
     refusal,
 )
-from mumacro.inputs.layout import ColumnNames
-from mumacro.inputs.names import absent, find_heads, meant_by, split_unit
+from mumacro.inputs.names import ColumnNames, absent, find_heads, meant_by, split_unit
 from mumacro.inputs.units import Scale, in_si, scale_of, too_large_in_si
 from mumacro.kernel.arrays import Array, Bools, Codes
 from mumacro.outputs import OUTPUTS

@@ -23,7 +23,8 @@ from mumacro.inputs.account import NO_ROW, Rows
 from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cells import BLANKS, GAPS, Signs, split_row
 from mumacro.inputs.decoding import Piece
-from mumacro.inputs.layout import ColumnNames, Dialect
+from mumacro.inputs.layout import Dialect
+from mumacro.inputs.names import ColumnNames
 from mumacro.inputs.text_tables import TextTable
 
 #: extensions of files that can be written, and their format

@@ -12,8 +12,8 @@ from mumacro.inputs.cases import check, columns_of, library_of, no_such_input, s
 from mumacro.inputs.columns import to_si
 from mumacro.inputs.doubts import UNITS, remarks
 from mumacro.inputs.fields import AMPLITUDE, MEASURED_AS, NAMES, kind_of
-from mumacro.inputs.layout import ColumnNames, Dialect
-from mumacro.inputs.names import split_unit, unknown_name
+from mumacro.inputs.layout import Dialect
+from mumacro.inputs.names import ColumnNames, split_unit, unknown_name
 from mumacro.inputs.text_tables import Most, TableOfNumbers, read_numbers
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.results import REMARK, Note

@@ -25,7 +25,8 @@ from mumacro.inputs.cells import (
 )
 from mumacro.inputs.column_units import ColumnUnits
 from mumacro.inputs.decoding import LONGEST, Piece
-from mumacro.inputs.layout import END_OF_HEADER, ColumnNames, Dialect, find_header, whole
+from mumacro.inputs.layout import END_OF_HEADER, Dialect, find_header, whole
+from mumacro.inputs.names import ColumnNames
 
 # first words of a row of statistics, in lower case
 _STATISTICS = re.compile(
@@ -103,8 +104,10 @@ class Account:
         self.header = header = find_header(lines, column_names, self.dialect)
         while header.cells and not header.cells[-1]:
             header.cells.pop()
-        self.units = ColumnUnits(header.cells, header.sep, column_names.input_of)
-        self.has_names = column_names.are_all_in(self.units.names)
+        self.first = 0  #: the first line that may be data; 0 while it is searched
+        input_of = column_names.input_of
+        self.units = ColumnUnits(header.cells, header.sep, input_of, self._remedy_of_units)
+        self.has_names = bool(column_names.heads_in(header.cells))
         self.width = len(self.units.names)
         #: separator of the cells in rows, after blanks were replaced by tabs
         self.sep = "\t" if header.sep == BLANKS else header.sep
@@ -122,7 +125,6 @@ class Account:
             self.units.take_cells(self.dialect.units + 1, ["", *cells[1:]])
         elif self.has_names:
             self._take_above(lines[: header.start])
-        self.first = 0  #: the first line that may be data; 0 while it is searched
         self.first = self._first_row(lines)
         self.last = dialect.rows[1] if dialect.rows else None  #: the last, if a person names it
         #: lines before the data that are not empty, not the header and not units
@@ -264,7 +266,7 @@ class Account:
         if is_comment(text) and not (self._has_name(text) and len(self._cells(text)) == self.width):
             if "\n" in text:
                 raise TextError(f"line {line}: a quote in a comment is not closed: leave it out")
-            self.units.take(line, text, self._remedy_of_units(line))
+            self.units.take(line, text)
             return Line.LEFT_OUT
         if not text.strip(_OF_RULER) and _RULER.search(text):
             return Line.LEFT_OUT
@@ -277,7 +279,7 @@ class Account:
             raise TextError(f"line {line}: {what}: {self.remedy(line)}")
         filled = [cells[i] for i in self.units.inputs if i < len(cells) and cells[i]]
         may_be_units = all(not starts_as_number(cell) or cell == "1" for cell in filled)
-        if may_be_units and self.units.take_row(line, text, self._remedy_of_units(line), True):
+        if may_be_units and self.units.take_row(line, text, is_no_row=True):
             return self._again(line) if self.first else Line.LEFT_OUT
         if not self._holds_values(cells, filled):
             shown = " ".join(text.split())[:60]
@@ -328,10 +330,9 @@ class Account:
         cells = split_header(uncommented(text), header.sep)
         if cells[: len(header.cells)] == header.cells:
             return True
-        columns = self._column_names.split(cells)
-        if not self._column_names.are_all_in(name for name, _ in columns):
+        columns = self._column_names.heads_in(cells)[: self.width]
+        if not columns:
             return False
-        columns = columns[: self.width]
         if [name for name, _ in columns] == units.names and all(
             units.agrees(i, columns[i][1]) for i in units.inputs
         ):

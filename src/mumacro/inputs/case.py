@@ -15,7 +15,7 @@ import numpy as np
 
 from mumacro.errors import InputError
 from mumacro.inputs.carried import carried_unit, numbers_in, read_unit, uncertain, without_mask
-from mumacro.inputs.fields import GAP, STIFFNESS, is_rigid, quantity_of
+from mumacro.inputs.fields import GAP, STIFFNESS, is_rigid
 from mumacro.inputs.numbers import split_number, tidy
 from mumacro.inputs.units import (
     QUANTITIES,
@@ -24,6 +24,7 @@ from mumacro.inputs.units import (
     canonical,
     explain_unit,
     parse_unit,
+    quantity_of,
 )
 
 #: types of one real number, without truth values

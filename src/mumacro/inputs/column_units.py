@@ -6,7 +6,7 @@ refused with its line.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 
 from mumacro.errors import TextError
@@ -23,7 +23,6 @@ from mumacro.inputs.names import heading, meant_by, split_unit
 from mumacro.inputs.units import Scale, scale_of, unit_of
 
 SI_UNIT = Scale()
-_LEAVE_ONE = "leave one of them out"
 _LONGEST = 20  # characters of a unit
 # words before the units in their row
 _LABEL = re.compile(r"(?:units?|einheit(?:en)?|unités?|[a-z]+_units)\W*", re.IGNORECASE)
@@ -53,8 +52,14 @@ class ColumnUnits:
     After the first row, a column without a unit is in SI.
     """
 
-    def __init__(self, cells: Sequence[str], sep: str, input_of: Mapping[str, str]) -> None:
-        self._sep, self._input_of = sep, input_of
+    def __init__(
+        self,
+        cells: Sequence[str],
+        sep: str,
+        input_of: Mapping[str, str],
+        remedy: Callable[[int], str],
+    ) -> None:
+        self._sep, self._input_of, self._remedy = sep, input_of, remedy
         self._heads = [heading(cell, input_of) for cell in cells]
         in_header = [split_unit(head) for head in self._heads]
         self.names = [name for name, _ in in_header]
@@ -89,37 +94,35 @@ class ColumnUnits:
     def _scale(self, i: int, unit: str) -> Scale:
         return scale_of(self._input_of[self.names[i]], unit) or SI_UNIT
 
-    def take(self, line: int, text: str, remedy: str = _LEAVE_ONE) -> bool:
+    def take(self, line: int, text: str) -> bool:
         """Take the units in a line, either a row of units or a legend.  Return whether the line has
         units."""
-        return self.take_row(line, text, remedy) or self.take_legend(line, text, remedy)
+        return self.take_row(line, text) or self.take_legend(line, text)
 
-    def take_legend(self, line: int, text: str, remedy: str = _LEAVE_ONE) -> bool:
+    def take_legend(self, line: int, text: str) -> bool:
         """Take the units after the names of columns in a line.  Return whether there are any."""
         legend = [*units_in_legend(text, [*self.inputs.values()])]
         for name, unit in legend:
-            self._take_one(line, self.names.index(name), unit, remedy)
+            self._take_one(line, self.names.index(name), unit)
         if not legend and not self.rows_begun:
             self._refuse_of_another_name(line, text)
         return bool(legend)
 
-    def take_row(
-        self, line: int, text: str, remedy: str = _LEAVE_ONE, is_no_row: bool = False
-    ) -> bool:
+    def take_row(self, line: int, text: str, is_no_row: bool = False) -> bool:
         """Take the units of a line that contains only units.  Return whether it is such a line.
 
         If ``is_no_row`` is true for the line and it is not a comment, columns that are not inputs
         may hold any text.
         """
         units = self._cells_of_units(line, text, is_no_row)
-        self.take_cells(line, units or [], remedy)
+        self.take_cells(line, units or [])
         return units is not None
 
-    def take_cells(self, line: int, units: Sequence[str], remedy: str = _LEAVE_ONE) -> None:
+    def take_cells(self, line: int, units: Sequence[str]) -> None:
         """Take the unit of each column; skip an empty one."""
         for i, unit in enumerate(units[: len(self.names)]):
             if unit:
-                self._take_one(line, i, unit, remedy)
+                self._take_one(line, i, unit)
 
     def _cells_of_units(self, line: int, text: str, is_no_row: bool) -> list[str] | None:
         """Return the units in a line that contains only units, or None for another line.  Raise
@@ -163,7 +166,7 @@ class ColumnUnits:
             )
         return None
 
-    def _take_one(self, line: int, i: int, unit: str, remedy: str) -> None:
+    def _take_one(self, line: int, i: int, unit: str) -> None:
         """Take the unit of one column."""
         name, before = self.names[i], self._units.get(i)
         if name in self._input_of:
@@ -172,13 +175,14 @@ class ColumnUnits:
             if scale_of(self._input_of[name], unit) is None:
                 raise TextError(f"line {line}: {unit[:40]!r} is no unit of {name}")
             if (before is not None or self.rows_begun) and not self.agrees(i, unit):
+                unit_before, line_before = before or ("", None)
                 if before is None:
                     says = "the rows before are in"
                     remedy = f"write the unit behind the name, as in {name} [{unit}]"
                 else:
-                    says = "the header says" if before[1] is None else f"line {before[1]} says"
-                unit_before = before[0] if before and before[0] else unit_of(name)
-                what = f"{name} is in {unit}, {says} {unit_before}"
+                    says = "the header says" if line_before is None else f"line {line_before} says"
+                    remedy = self._remedy(line)
+                what = f"{name} is in {unit}, {says} {unit_before or unit_of(name)}"
                 raise TextError(f"line {line}: {what}: {remedy}")
         if not self.rows_begun:
             self._units.setdefault(
@@ -215,7 +219,7 @@ class ColumnUnits:
             if name and unit and name[1].strip() in self.names:
                 number = next(n for start, n in reversed(starts) if start <= column.start())
                 place = self.names.index(name[1].strip())
-                self._take_one(number, place, unit[1].strip(), _LEAVE_ONE)
+                self._take_one(number, place, unit[1].strip())
 
 
 def units_in_legend(line: str, names: Sequence[str]) -> Iterator[tuple[str, str]]:

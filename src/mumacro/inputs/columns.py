@@ -33,9 +33,17 @@ from mumacro.inputs.case import (
     other_number,
     read,
 )
-from mumacro.inputs.fields import GAP, is_rigid, quantity_of
+from mumacro.inputs.fields import GAP, is_rigid
 from mumacro.inputs.numbers import TOO_LARGE
-from mumacro.inputs.units import QUANTITIES, Unit, in_si, parse_unit, scale_of, too_large_in_si
+from mumacro.inputs.units import (
+    QUANTITIES,
+    Unit,
+    in_si,
+    parse_unit,
+    quantity_of,
+    scale_of,
+    too_large_in_si,
+)
 from mumacro.kernel.arrays import Array
 
 _FLOAT = np.dtype(np.float64)

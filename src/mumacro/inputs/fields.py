@@ -150,17 +150,6 @@ def is_rigid(text: object) -> bool:
     return isinstance(text, str) and text.strip().lower() == RIGID
 
 
-def quantity_of(name: str) -> str:
-    """Return the quantity of an input, of its deviation, of a part of an oscillation, or of another
-    argument, by its name.  The default is a ratio.
-
-    >>> [quantity_of(name) for name in ("v0", "std_k", "normal.amplitude", "y.phase")]
-    ['speed', 'stiffness', 'force', 'angle']
-    """
-    part, _, member = name.removeprefix("std_").partition(".")
-    return QUANTITY_OF.get("phase" if member == "phase" else part, "ratio")
-
-
 def described(name: str, addition: str = "") -> str:
     """Return the description of an input, with its unit.
 

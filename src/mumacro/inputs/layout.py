@@ -5,7 +5,7 @@ what the lines after it are.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from mumacro.inputs.cells import (
     starts_as_number,
     uncommented,
 )
-from mumacro.inputs.names import heading, meant_by, split_unit
+from mumacro.inputs.names import ColumnNames, meant_by
 
 #: separators of the cells, by the name in an option
 SEPARATORS = {",": ",", ";": ";", "|": "|", "tab": "\t", "blanks": BLANKS}
@@ -63,27 +63,6 @@ class Dialect(NamedTuple):
             elif tag == "Y_Unit_Label" and ends < 2:
                 units = i
         return self._replace(sep=self.sep or sep, decimal=decimal, labview=True, units=units)
-
-
-class ColumnNames(NamedTuple):
-    """Name the columns of a table that have a meaning."""
-
-    input_of: Mapping[str, str]  #: by name: the input whose units the column has
-    #: of each of these lists, one name must be in the table
-    required_groups: Sequence[Sequence[str]]
-
-    def are_all_in(self, names: Iterable[str]) -> bool:
-        """Return whether the names of some columns contain all necessary ones."""
-        present = {*names}
-        return not any(present.isdisjoint(group) for group in self.required_groups)
-
-    def may_be_in(self, text: str) -> bool:
-        """Return whether a text contains all necessary names, as words or within other words."""
-        return all(any(name in text for name in names) for names in self.required_groups)
-
-    def split(self, cells: Sequence[str]) -> list[tuple[str, str | None]]:
-        """Return the name and the unit in each cell of a header."""
-        return [split_unit(heading(cell, self.input_of)) for cell in cells]
 
 
 class Header(NamedTuple):
@@ -151,7 +130,7 @@ def _headers_in(
         for sep in seps:
             for bare in texts:
                 cells = split_header(bare, sep)
-                if column_names.are_all_in(name for name, _ in column_names.split(cells)):
+                if column_names.heads_in(cells):
                     yield Header(i, end, sep, cells)
 
 

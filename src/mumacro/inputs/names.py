@@ -4,6 +4,7 @@ with a unit.  Return also the unit, and the advice for a name that is unknown or
 import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 from mumacro.inputs.fields import INPUTS, NAMES, QUANTITY_OF
 from mumacro.inputs.units import (
@@ -132,6 +133,25 @@ def heading(cell: str, input_of: Mapping[str, str]) -> str:
         if scale_of(input_of[match[1]], unit) is not None:
             return f"{match[1]} [{unit}]"
     return text
+
+
+class ColumnNames(NamedTuple):
+    """Name the columns of a table that have a meaning."""
+
+    input_of: Mapping[str, str]  #: by name: the input whose units the column has
+    #: of each of these lists, one name must be in the table
+    required_groups: Sequence[Sequence[str]]
+
+    def may_be_in(self, text: str) -> bool:
+        """Return whether a text contains all necessary names, as words or within other words."""
+        return all(any(name in text for name in names) for names in self.required_groups)
+
+    def heads_in(self, cells: Sequence[str]) -> list[tuple[str, str | None]]:
+        """Return the name and the unit in each cell of a header, or nothing if a necessary name is
+        not among them."""
+        heads = [split_unit(heading(cell, self.input_of)) for cell in cells]
+        names = {name for name, _ in heads}
+        return [] if any(names.isdisjoint(group) for group in self.required_groups) else heads
 
 
 def find_heads(

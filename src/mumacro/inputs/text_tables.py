@@ -17,8 +17,8 @@ from mumacro.errors import TextError
 from mumacro.inputs.account import Account, Rows, names_statistics, unclosed
 from mumacro.inputs.cells import BLANKS, MOST_COLUMNS, Cell, Signs, numbers_of
 from mumacro.inputs.decoding import LONGEST, NAMES, Piece, Text, byte_pieces
-from mumacro.inputs.layout import LOOKED_AT, ColumnNames, Dialect
-from mumacro.inputs.names import absent, find_heads
+from mumacro.inputs.layout import LOOKED_AT, Dialect
+from mumacro.inputs.names import ColumnNames, absent, find_heads
 from mumacro.inputs.units import in_si, too_large_in_si
 from mumacro.inputs.workbooks import BEGIN, SEP, read_sheet
 from mumacro.kernel.arrays import Array
@@ -100,8 +100,11 @@ class TextTable:
         words += [f"units in line{'s' * (len(lines) > 1)} {places}"] if lines else []
         words += [f"rows {account.first}..{account.last}"] if account.last else []
         units = (f"{name} [{unit}]" for name, unit in account.units.of_inputs().items())
-        again = headers_left_out(sorted(account.repeated))
-        return f"{self._sheets}{', '.join(words)}; {', '.join(units)}{again}"
+        again = sorted(account.repeated)
+        rest = f" and {len(again) - 5:,} more" if len(again) > 5 else ""
+        places = f"{'s' * (len(again) > 1)} {', '.join(map(str, again[:5]))}{rest}"
+        left_out = f"; the header again in line{places}, left out" if again else ""
+        return f"{self._sheets}{', '.join(words)}; {', '.join(units)}{left_out}"
 
     def find_signs(self) -> None:
         """Search the first pieces for the separators of numbers, some rows at a time.  Skip this if
@@ -260,16 +263,3 @@ def _wrong_rows(wrong: list[tuple[int, str]], lines: list[int], dialect: Dialect
     with_remedy = TextError(f"{error}; {remedy}")
     with_remedy.faults = error.faults
     return with_remedy
-
-
-def headers_left_out(lines: list[int]) -> str:
-    """Return the sentence about lines that repeat the header or its units.
-
-    >>> headers_left_out([7]), headers_left_out([])
-    ('; the header again in line 7, left out', '')
-    """
-    if not lines:
-        return ""
-    rest = f" and {len(lines) - 5:,} more" if len(lines) > 5 else ""
-    places = ", ".join(map(str, lines[:5])) + rest
-    return f"; the header again in line{'s' * (len(lines) > 1)} {places}, left out"

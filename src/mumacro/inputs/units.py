@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from mumacro.inputs.fields import QUANTITY_OF, RAD_PER_CYCLE, SI, quantity_of
+from mumacro.inputs.fields import QUANTITY_OF, RAD_PER_CYCLE, SI
 from mumacro.inputs.numbers import TOO_LARGE, tidy
 from mumacro.kernel.arrays import Array
 
@@ -379,6 +379,17 @@ def parse_unit(quantity: str, text: str) -> Unit | None:
         of_length = canonical(match[1])
         symbol = of_length if of_length in units else symbol
     return Unit(symbol, units[symbol]) if symbol in units else None
+
+
+def quantity_of(name: str) -> str:
+    """Return the quantity of an input, of its deviation, of a part of an oscillation, or of another
+    argument, by its name.  The default is a ratio.
+
+    >>> [quantity_of(name) for name in ("v0", "std_k", "normal.amplitude", "y.phase")]
+    ['speed', 'stiffness', 'force', 'angle']
+    """
+    part, _, member = name.removeprefix("std_").partition(".")
+    return QUANTITY_OF.get("phase" if member == "phase" else part, "ratio")
 
 
 def scale_of(name: str, unit: str) -> Scale | None:

@@ -17,9 +17,9 @@ from mumacro.errors import InputError
 from mumacro.inputs.case import read_one
 from mumacro.inputs.cases import real
 from mumacro.inputs.columns import to_si
-from mumacro.inputs.fields import RAD_PER_CYCLE, Numbers, quantity_of
+from mumacro.inputs.fields import RAD_PER_CYCLE, Numbers
 from mumacro.inputs.names import unknown_name
-from mumacro.inputs.units import unit_of
+from mumacro.inputs.units import quantity_of, unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.motions.motion import PARTS, motion
 from mumacro.motions.oscillation import MEMBERS, read_oscillation

@@ -10,7 +10,8 @@ from mumacro.errors import TextError
 from mumacro.inputs.case import read
 from mumacro.inputs.cells import Signs, numbers_of
 from mumacro.inputs.doubts import remarks
-from mumacro.inputs.layout import ColumnNames, Dialect
+from mumacro.inputs.layout import Dialect
+from mumacro.inputs.names import ColumnNames
 from mumacro.inputs.numbers import TOO_LARGE
 from mumacro.inputs.text_tables import TableOfNumbers, read_numbers
 from mumacro.inputs.units import in_si, scale_of, too_large_in_si

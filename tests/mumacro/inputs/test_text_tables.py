@@ -24,8 +24,8 @@ from mumacro.fits.fit import fit
 from mumacro.fits.measured_points import read_points
 from mumacro.inputs.cells import BLANKS, GAPS, Signs, evidence, numbers_of, read_cell
 from mumacro.inputs.decoding import Text, encoding_of
-from mumacro.inputs.layout import ColumnNames, Dialect
-from mumacro.inputs.names import absent
+from mumacro.inputs.layout import Dialect
+from mumacro.inputs.names import ColumnNames, absent
 from mumacro.inputs.text_tables import TableOfNumbers, read_numbers
 from mumacro.inputs.units import Scale
 from tests.support.comparing import close
