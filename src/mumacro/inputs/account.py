@@ -60,7 +60,7 @@ _UNCLOSED = re.compile(r' *+"(?:[^"]++|"")*+\Z')
 class Line(enum.Enum):
     """Name what a line after the header may be."""
 
-    ROW, EMPTY, LEFT_OUT, HEADER_AGAIN = range(4)
+    ROW, EMPTY, LEFT_OUT = range(3)
 
 
 class Rows(NamedTuple):
@@ -290,7 +290,7 @@ class Account:
     def _again(self, line: int) -> Line:
         """Account for a line that repeats the header or its units."""
         self.repeated.add(line)
-        return Line.HEADER_AGAIN
+        return Line.LEFT_OUT
 
     def _holds_values(self, cells: Sequence[str], filled: Sequence[str]) -> bool:
         """Return whether some of the ``filled`` cells of inputs may be a value.  A row without any

@@ -109,10 +109,9 @@ class TextTable:
     def find_signs(self) -> None:
         """Search the first pieces for the separators of numbers, some rows at a time.  Skip this if
         columns are missing, because then that is reported."""
-        for piece in self._data_of(self._start) if self.account.has_names else ():
-            for part in piece.parts(_AT_ONCE):
-                if not self.signs.decimal:
-                    self.see_signs(self.account.rows_in(part))
+        parts = (part for piece in self._data_of(self._start) for part in piece.parts(_AT_ONCE))
+        while self.account.has_names and not self.signs.decimal and (part := next(parts, None)):
+            self.see_signs(self.account.rows_in(part))
         self._start = []
 
     def pieces(self) -> Iterator[Piece]:
