@@ -149,7 +149,9 @@ def leaves_of(document: Row, path: str = "") -> Row:
     return leaves
 
 
-def test_every_column_that_include_adds_is_the_same_in_every_format(client: Any) -> None:
+def test_every_column_that_include_adds_is_the_librarys_in_every_format(
+    client: Any, surrogate: Surrogate
+) -> None:
     good, std = list(GOOD), {"v0": 1e-3, "mu0": 0.01}
     options = {"include": INCLUDED, **flat(std)}
     single = [
@@ -159,6 +161,9 @@ def test_every_column_that_include_adds_is_the_same_in_every_format(client: Any)
     assert names[: len(COLUMNS)] == list(COLUMNS)
     assert len(names) > 30
     single = [{name: row[name] for name in names} for row in single]
+    for row, answer in zip(good, single, strict=True):
+        own = leaves_of(surrogate.evaluate(**{**row, **options}).to_dict())
+        assert {name: own[name] for name in names} == answer
     columns = client.post(
         BATCH, json={**{name: [row[name] for row in good] for name in NAMES}, **options}
     ).json()

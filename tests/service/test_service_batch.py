@@ -24,12 +24,13 @@ def one(client: Any, case: Case) -> Any:
     return client.post("/v1/mu-macro", json=case).json()
 
 
+UNKNOWN = ("speed", "", "mu\ud800", "}", "]")
 BAD_ROWS = [
     ({"mu0": 0}, "mu0", "must be finite and > 0"),
-    (17, None, "must be an object"),
-    (None, None, "must be an object"),
+    *((entry, None, "must be an object") for entry in (17, None, "a:b", True, [1])),
+    ({"mu0": {"a": 1}}, "mu0", "must be a number"),
     ({"Fz": ...}, "Fz", "is required"),
-    ({"speed": 1}, "speed", "unknown"),
+    *(({name: 1}, name.replace("\ud800", "?"), "unknown field") for name in UNKNOWN),
     ({"v0": True}, "v0", "must be a number"),
     ({"include": []}, "include", "unknown"),
     ({"k": ...}, "k", "rigid"),
@@ -42,7 +43,7 @@ def test_a_bad_case_affects_only_itself_in_rows(client: Any, case: Case) -> None
         {name: x for name, x in row.items() if x is not ...} if isinstance(row, dict) else row
         for row in rows
     ]
-    answer = client.post(BATCH, json=[case, *rows]).json()
+    answer = client.post(BATCH, content=json.dumps([case, *rows])).json()
     single = one(client, case)
     assert answer["results"] == [{name: single[name] for name in VALUES}, *[None] * len(rows)]
     for index, (error, (_, field, words)) in enumerate(
@@ -54,12 +55,12 @@ def test_a_bad_case_affects_only_itself_in_rows(client: Any, case: Case) -> None
 
 def test_the_list_of_errors_is_bounded_and_their_number_is_given(client: Any, case: Case) -> None:
     answer = client.post(
-        BATCH, json={**case, "v0": [-1.0] * 5000 + [1.0], "include": ["groups"]}
+        BATCH, json={**case, "v0": [-1.0] * 9000 + [1.0], "include": ["groups"]}
     ).json()
     assert [error["index"] for error in answer["errors"]] == list(range(1000))
-    assert answer["n_errors"] == 5000
-    assert [value is None for value in answer["mu_macro"]] == [True] * 5000 + [False]
-    assert answer["groups"]["l0"][:5000] == answer["regime"][:5000] == [None] * 5000
+    assert answer["n_errors"] == 9000  # two slices
+    assert [value is None for value in answer["mu_macro"]] == [True] * 9000 + [False]
+    assert answer["groups"]["l0"][:9000] == answer["regime"][:9000] == [None] * 9000
 
 
 TEXTS = ["10 cm/s", "0.1", "rigid", "", "0.1 ± 0.01", "0.1..0.2 m/s"]
@@ -67,7 +68,7 @@ TEXTS = ["10 cm/s", "0.1", "rigid", "", "0.1 ± 0.01", "0.1..0.2 m/s"]
 
 @pytest.mark.parametrize("text", TEXTS)
 @pytest.mark.parametrize("name", ["v0", "k", "k_low", "std_mu0"])
-def test_a_text_among_numbers_is_a_gap_and_a_column_of_texts_is_refused_once(
+def test_a_text_among_numbers_is_a_gap_and_a_column_of_texts_one_fault(
     client: Any, problem: Any, case: Case, name: str, text: str
 ) -> None:
     """A person's text is for one case; a program sends numbers."""
@@ -147,11 +148,6 @@ def test_an_odd_row_is_seen_in_every_place(client: Any, odd: str, field: Any, be
         assert answer["results"][before] == expected
 
 
-@pytest.mark.parametrize("text", ["[", " [", "[\n", "[ ", "[,", "[{", "[[", "[]]", "[ ] ["])
-def test_half_a_list_is_no_json(client: Any, problem: Any, text: str) -> None:
-    assert problem(client.post(BATCH, content=text), 400)["type"].endswith("malformed-body")
-
-
 def test_rows_may_stand_far_apart(client: Any) -> None:
     answer = client.post(BATCH, content=f"[{GOOD},{' ' * 2_000_000}{GOOD}]").json()
     assert answer["n_errors"] == 0
@@ -196,17 +192,6 @@ def test_an_empty_batch_has_an_empty_answer_and_scalars_are_one_case(
     assert all(columns[name] == [] for name in VALUES)
     assert columns["limits"] == {"mu_static": [], "v0_crit": [], "mu_crit": []}
     assert len(client.post(BATCH, json=case).json()["mu_macro"]) == 1
-
-
-@pytest.mark.parametrize(
-    "entry", [3, "a:b", None, True, [1], {}, {"mu0": {"a": 1}}, {"mu\ud800": 1}], ids=ascii
-)
-def test_an_entry_that_is_no_case_is_bad_alone(client: Any, case: Case, entry: Any) -> None:
-    reply = client.post(BATCH, content=json.dumps([case, entry, case]))
-    assert reply.status_code == 200
-    answer = reply.json()
-    assert [row is None for row in answer["results"]] == [False, True, False]
-    assert [error["index"] for error in answer["errors"]] == [1]
 
 
 def test_of_a_name_that_is_given_twice_the_last_counts(client: Any, case: Case) -> None:
@@ -283,15 +268,6 @@ def test_the_advice_for_an_unknown_name_is_looked_for_in_rows_that_are_listed(cl
     assert looked.call_count == 1000
 
 
-@pytest.mark.parametrize("name", ["", "name", "mu\ud800", "}", "]"])
-def test_any_unknown_name_of_a_row_is_told(client: Any, name: str) -> None:
-    rows = json.dumps([{**SPRING, "k": 1e6}, {**SPRING, "k": 1e6, name: 1}])
-    (fault,) = client.post(BATCH, content=rows).json()["errors"]
-    assert fault["index"] == 1
-    assert fault["field"] == name.replace("\ud800", "?")
-    assert fault["reason"].startswith("unknown field")
-
-
 BESIDE_AN_INTERVAL = ("k", "must be finite beside rows with an interval of k")
 
 
@@ -299,7 +275,9 @@ BESIDE_AN_INTERVAL = ("k", "must be finite beside rows with an interval of k")
 @given(rows=CASES)
 @example(rows=[{**SPRING, "k": 1e6, "contact": name} for name in ("ball", "cube")])
 @example(rows=[{**LIFTED, "k": 1e6, "y0": True}])
-def test_rows_are_answered_and_refused_like_each_of_them_alone(client: Any, rows: Any) -> None:
+def test_rows_are_answered_or_told_their_fault_like_each_of_them_alone(
+    client: Any, rows: Any
+) -> None:
     answer = client.post(BATCH, json=rows).json()
     faults = {fault["index"]: (fault["field"], fault["reason"]) for fault in answer["errors"]}
     for i, (row, result) in enumerate(zip(rows, answer["results"], strict=True)):
@@ -356,22 +334,6 @@ def test_a_request_has_one_contact_and_one_direction(client: Any, problem: Any, 
         assert "split" in fault["reason"]
 
 
-@pytest.mark.parametrize(
-    ("columns", "field"),
-    [
-        ({"k": [1e6, 1e6], "k_low": [1e5, 1e5], "k_high": [2e5, 2e5]}, "k"),
-        ({"v0": [0.01, 0.1], "std": {"mu0": 0.05}}, "std"),
-        ({"v0": [0.01, 0.1], "std_nothing": 0.05}, "std_nothing"),
-    ],
-)
-def test_no_column_is_dropped_for_another(
-    client: Any, problem: Any, columns: Any, field: str
-) -> None:
-    body = {**SPRING, "k": 1e6, **columns}
-    (fault,) = problem(client.post(BATCH, json=body), 422)["errors"]
-    assert fault["field"] == field
-
-
 def test_a_query_holds_for_rows_in_whichever_way_they_are_read(client: Any) -> None:
     """A null, or a row of other members, makes a list of rows be read one by one."""
     normal = {**LIFTED, "k": 1e6}
@@ -390,24 +352,13 @@ def test_a_query_holds_for_rows_in_whichever_way_they_are_read(client: Any) -> N
     assert (fault["field"], "given in the query" in fault["reason"]) == ("std_k", True)
 
 
-@pytest.mark.parametrize("name", ["mu0", "Fz", "v0"])
-def test_a_null_is_refused_in_the_same_words_everywhere(
-    client: Any, problem: Any, name: str
-) -> None:
+@pytest.mark.parametrize("name", ["mu0", "Fz", "k", "v0"])
+def test_a_null_has_the_same_reason_everywhere(client: Any, problem: Any, name: str) -> None:
     case = {**SPRING, "k": 1e6, name: None}
-    words = {(name, "is required")}
-    assert of_one(client, case) == words
+    words = of_one(client, case)
+    assert [field for field, _ in words] == [name]
     (alone,) = problem(client.post(BATCH, json=case), 422)["errors"]
     faults = [alone]
     for body in ([case], {**case, name: [None, 0.1]}):
         faults += client.post(BATCH, json=body).json()["errors"]
     assert {(fault["field"], fault["reason"]) for fault in faults} == words
-
-
-def test_of_many_bad_cases_all_are_counted_and_the_first_thousand_listed(
-    client: Any, case: Case
-) -> None:
-    two_slices = {**case, "v0": [-1.0] * 9000}
-    answer = client.post("/v1/mu-macro/batch", json=two_slices).json()
-    assert answer["n_errors"] == 9000
-    assert [error["index"] for error in answer["errors"]] == [*range(1000)]

@@ -56,26 +56,10 @@ REFUSED = [
     # numbers
     *(
         ("POST mu-macro", {name: value}, f"#/{name}")
-        for name in ("mu0", "k", "v0", "tolerance")
+        for name in ("mu0", "tolerance")
         for value in ("0.3 kN", True, [0.3], {"value": 0.3}, "")
     ),
-    *(
-        ("GET mu-macro", {"k": text}, "?k")
-        for text in (
-            "abc",
-            "",
-            " ",
-            "1_000",
-            "0x10",
-            "٣",
-            "1e",
-            "1,500",
-            "--1",
-            "1 2",
-            "null",
-            "0",
-        )
-    ),
+    *(("GET mu-macro", {"k": text}, "?k") for text in ("abc", "", "null", "1,500", "0")),
     *(
         (f"POST {path}", {name: zero}, f"#/{name}")
         for path in ("mu-macro", "mu-macro/batch")
@@ -140,10 +124,14 @@ REFUSED = [
             ({"y0": [1e-6]}, "v0"),
             ({"y0": []}, "v0"),
             ({"Fz": ...}, "Fz"),
-            ({"k": None}, "k"),
+            *(({name: None}, name) for name in ("k", "y0", "omega")),
             ({"speed": [1]}, "speed"),
             ({"y0": {}}, "y0"),
             ({"include": ["model"]}, "include"),
+            ({"cases": [CASE]}, "cases"),
+            ({"k_low": [1e5, 1e5], "k_high": [2e5, 2e5]}, "k"),
+            ({"std": {"mu0": 0.05}}, "std"),
+            ({"std_nothing": 0.05}, "std_nothing"),
         )
     ),
     ("POST mu-macro/batch?nonsense=1", {}, "?nonsense"),
@@ -175,10 +163,7 @@ REFUSED = [
     *((f"{call}", {"include": ["model"]}, "#/include") for call in ("POST law", "POST solve-for")),
     ("GET law.csv?mu0=0.4", {}, "?mu0"),
     ("GET law.csv", {"omega": ...}, "?omega"),
-    *(
-        ("GET law.csv", {"Fz": text}, "?Fz")
-        for text in ("", "ten", "nan", "inf", "1e999", "0x10", "1_000")
-    ),
+    ("GET law.csv", {"Fz": "ten"}, "?Fz"),
     ("POST law?mu0=1", {}, "?mu0"),
     # solve-for
     *(
@@ -251,7 +236,7 @@ def faults_of(client: Any, problem: Any, request_line: str, changed: Any) -> dic
 
 
 @pytest.mark.parametrize(("request_line", "changed", "place"), REFUSED)
-def test_a_bad_field_is_refused_by_its_place(
+def test_a_fault_has_its_place_its_field_and_a_reason(
     client: Any, problem: Any, request_line: Any, changed: Any, place: Any
 ) -> None:
     faults = faults_of(client, problem, request_line, changed)
@@ -260,32 +245,6 @@ def test_a_bad_field_is_refused_by_its_place(
     if name.isalpha():
         assert faults[place]["field"] == name
     assert faults[place]["reason"]
-
-
-#: what helps: the request, what is changed, the parameter, and the remedy that its reason names
-HINTS = [
-    *(
-        ("GET mu-macro", {name: 1}, f"?{name}", f"mean {meant}?")
-        for name, meant in (("fz", "Fz"), ("K", "k"), ("stiffness", "k"), ("frequency", "f"))
-    ),
-    ("POST mu-macro", {"k": ...}, "#/k", "rigid"),
-    ("GET mu-macro", {"k": ""}, "?k", "rigid"),
-    ("POST mu-macro", {"omega": ..., "v0": -1}, "#/omega", "f [Hz]"),
-    ("GET mu-macro", {"v0": "1,000"}, "?v0", "1000 or 1.0"),
-    ("GET mu-macro", {"y0": "2 kN"}, "?y0", "mm, um"),
-    ("GET mu-macro", {"v0": "5 mm"}, "?v0", "metres per second"),
-    ("POST mu-macro", {"v0": "0.01 mm"}, "#/v0", "mm/s"),
-    ("POST mu-macro", {**NORMAL, "Fz_amplitude": 10.0}, "#/Fz_amplitude", "lifts off"),
-    ("POST mu-macro", {"contact": "cone"}, "#/contact", "spring, ball"),
-    ("POST mu-macro", {"include": ["curvature"]}, "#/include/0", "groups, limits"),
-]
-
-
-@pytest.mark.parametrize(("request_line", "changed", "place", "remedy"), HINTS)
-def test_a_reason_names_the_remedy(
-    client: Any, problem: Any, request_line: Any, changed: Any, place: Any, remedy: Any
-) -> None:
-    assert remedy in faults_of(client, problem, request_line, changed)[place]["reason"]
 
 
 BEYOND = {
@@ -304,7 +263,7 @@ BEYOND = {
 
 @pytest.mark.parametrize("text", BEYOND, ids=lambda text: text[:12])
 @pytest.mark.parametrize("name", CASE)
-def test_a_number_out_of_bounds_is_refused_and_shown(
+def test_a_number_out_of_bounds_is_shown_with_its_bound(
     client: Any, problem: Any, name: str, text: str
 ) -> None:
     body = json.dumps({**CASE, name: "@"}).replace('"@"', text)
@@ -369,14 +328,6 @@ def test_all_faults_are_reported_at_once_and_their_list_is_bounded(
     problem(client.get(SINGLE + "?" + "&".join(f"a{i}=1" for i in range(200))), 422)
 
 
-@pytest.mark.parametrize("name", [*CASE])
-def test_a_null_in_one_case_sent_as_a_batch_is_refused_by_its_name(
-    client: Any, problem: Any, name: str
-) -> None:
-    (fault,) = problem(client.post(BATCH, json={**CASE, name: None}), 422)["errors"]
-    assert fault["field"] == name
-
-
 TWICE = (
     '{"mu0":0.3,"Fz":10,"k":1e6,"y0":2e-6,"omega":1e5,"v0":%s,"mu0":0.2}',
     '{"mu0":0.3,"Fz":10,"k":null,"y0":2e-6,"f":1e4,"v0":%s,"\\u006du0":0.2}',
@@ -386,7 +337,7 @@ TWICE = (
 
 
 @pytest.mark.parametrize("text", TWICE)
-def test_a_name_given_twice_is_refused(client: Any, problem: Any, text: str) -> None:
+def test_one_case_has_each_name_once(client: Any, problem: Any, text: str) -> None:
     """A batch takes the last one."""
     (fault,) = problem(client.post(SINGLE, content=text % "0.1"), 422)["errors"]
     assert (fault["field"], fault["reason"]) == ("mu0", "is given more than once")
@@ -395,7 +346,7 @@ def test_a_name_given_twice_is_refused(client: Any, problem: Any, text: str) -> 
     assert "more than once" in fault["reason"]
 
 
-def test_a_frequency_whose_omega_is_beyond_double_range_is_refused_by_its_own_name(
+def test_a_frequency_whose_omega_is_beyond_double_range_is_at_fault_by_its_own_name(
     client: Any, problem: Any
 ) -> None:
     case = {**CASE, "f": 1.7e308}
@@ -427,7 +378,9 @@ CASES = "must be an object of columns or a list of rows"
     "path", ["mu-macro", "mu-macro/batch", "solve-for", "law", "stiffness", "fit"]
 )
 @pytest.mark.parametrize("body", ["[]", "3", "null", '"text"', "true"])
-def test_json_of_another_kind_is_refused(client: Any, problem: Any, path: Any, body: Any) -> None:
+def test_json_of_another_kind_is_told_what_it_must_be(
+    client: Any, problem: Any, path: Any, body: Any
+) -> None:
     response = client.post(f"/v1/{path}", content=body)
     if path == "mu-macro/batch" and body == "[]":  # no rows
         assert response.json()["results"] == []
@@ -445,13 +398,17 @@ NO_JSON = (
     b"{'mu0': 1}",
     b"\xff\xfe",
     b"{} {}",
+    b"[,",
+    b"[[",
+    b"[{",
+    b"[ ] [",
     b"[" * 50_000,
     b"\xff" * 60_000,
 )
 
 
 @pytest.mark.parametrize("path", ["mu-macro", "mu-macro/batch", "solve-for", "law"])
-@pytest.mark.parametrize("body", NO_JSON, ids=range(9))
+@pytest.mark.parametrize("body", NO_JSON, ids=range(len(NO_JSON)))
 def test_a_body_that_is_not_json_is_malformed(
     client: Any, problem: Any, path: Any, body: Any
 ) -> None:
@@ -459,9 +416,7 @@ def test_a_body_that_is_not_json_is_malformed(
 
 
 @pytest.mark.parametrize("path", ["mu-macro", "mu-macro/batch", "solve-for", "law"])
-def test_other_media_types_and_a_compressed_body_are_refused(
-    client: Any, problem: Any, path: Any
-) -> None:
+def test_plain_json_is_the_only_media_type(client: Any, problem: Any, path: Any) -> None:
     for kind in (
         "text/plain",
         "text/csv",
@@ -501,7 +456,7 @@ FORMS: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("name", FORMS)
-def test_a_batch_over_the_limit_is_refused_in_every_form(few: Any, problem: Any, name: str) -> None:
+def test_a_batch_has_the_same_limit_in_every_form(few: Any, problem: Any, name: str) -> None:
     fine, over = (few.post(BATCH, content=FORMS[name]([CASE] * many)) for many in (3, 4))
     assert (fine.status_code, b"max_batch" in fine.content) == (200, False)
     assert problem(over, 413)["max_batch"] == 3
@@ -525,7 +480,7 @@ def test_values_are_counted_before_they_are_made(few: Any, problem: Any) -> None
         ),
     ],
 )
-def test_a_number_below_its_bound_is_refused_with_this_bound(
+def test_a_number_below_its_bound_is_told_this_bound(
     client: Any, path: str, body: Any, bound: str
 ) -> None:
     (fault,) = client.post(path, json=body).json()["errors"]

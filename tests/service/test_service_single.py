@@ -14,14 +14,12 @@ from hypothesis import strategies as st
 
 from mumacro import Surrogate
 from service import bodies
-from tests.support.cases import Case, flat
+from tests.support.cases import Case
 from tests.support.comparing import close
-from tests.support.settling import settling
 
 DEFAULT = {"mu_macro", "mu_ratio", "regime", "error_bound", "source", "table", "api_version"}
 REMARKS = ("remarks",)  # only where something is doubtful
 PATH = "/v1/mu-macro"
-STD = {"mu0": 0.01, "Fz": 0.5, "k": 5e4, "y0": 1e-7, "omega": 1e3, "v0": 1e-3}
 
 positive = st.floats(min_value=5e-324, max_value=1.7e308) | st.floats(1e-6, 1e6)
 not_negative = st.just(0.0) | positive
@@ -146,31 +144,9 @@ def test_nothing_sticks_without_oscillation_or_k(
     )
 
 
-@pytest.mark.parametrize("k", [1e6, "rigid"])
-def test_the_standard_deviation_is_the_root_of_squares(client: Any, case: Case, k: Any) -> None:
-    case["k"] = k
-    answer = ask(client, case, include=["gradient", "std"], **flat(STD))
-    slopes = {name: slope for name, slope in answer["gradient"].items() if slope is not None}
-    # rigid contact has no slope in k
-    assert case.keys() - slopes.keys() == ({"k"} if k == "rigid" else set())
-    assert answer["std"] == close(
-        math.hypot(*(slopes[name] * STD[name] for name in slopes)), rel=1e-12
-    )
-    only = ask(client, case, include=["std"], std_mu0=0.01)
-    assert "gradient" not in only
-    assert only["std"] == close(0.01 * abs(slopes["mu0"]), rel=1e-12)
-
-
 def test_one_name_stands_in_place_of_a_list_of_one(client: Any, case: Case) -> None:
     for name in ("power", "inputs"):
         assert ask(client, case, include=name) == ask(client, case, include=[name])
-
-
-def test_cases_within_an_object_are_pointed_to_rows_and_columns(client: Any, case: Case) -> None:
-    answer = client.post(f"{PATH}/batch", json={"cases": [case]})
-    assert answer.status_code == 422
-    told = {fault["field"]: fault["reason"] for fault in answer.json()["errors"]}
-    assert "rows are" in told["cases"]
 
 
 @pytest.mark.parametrize(("mu0", "f"), [("0,3", "20.000"), ("0,3", "20.000 Hz"), ("0,25", "1.300")])
@@ -182,27 +158,6 @@ def test_texts_of_a_case_agree_on_their_signs(client: Any, case: Case, mu0: str,
     assert mu0 in fault["reason"]
     assert client.post(PATH, json={**case, "mu0": mu0, "f": "20000,0"}).status_code == 200
     assert client.post(PATH, json={**case, "mu0": mu0.replace(",", "."), "f": f}).status_code == 200
-
-
-def test_settling_is_the_librarys(client: Any, case: Case, surrogate: Surrogate) -> None:
-    for change in (
-        {},
-        {"v0": 1e-4, "y0": 1e-7},
-        {"v0": 5.0, "y0": 1e-4},
-        {"omega": 0},
-        {"k": "rigid"},
-        {"v0": 0},
-    ):
-        at: Case = {**case, **change}
-        answer, expected = ask(client, at, include=["settling"]), settling(surrogate, **at)
-        for name, value in {
-            **answer["settling"],
-            "error_bound": answer["settling_bound"]["periods"],
-        }.items():
-            assert value == (
-                getattr(expected, name) if math.isfinite(getattr(expected, name)) else None
-            ), name
-        assert (answer["settling"]["time"] is None) == (at["v0"] == 0)  # it never slips
 
 
 def test_an_endpoint_answers_a_case_by_five_functions(client: Any, case: Case) -> None:
