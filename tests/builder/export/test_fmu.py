@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from builder.export.fmu.model import STARTS
 from builder.export.grid import export_table
 from mumacro import Surrogate
-from mumacro.inputs.fields import CONTACTS, DIRECTIONS, FIELDS
+from mumacro.inputs.fields import CONTACTS, DIRECTIONS, FIELDS, INPUTS
 from tests.support import compilers
 from tests.support.cases import CASE, PAIRS, as_kind, tables
 from tests.support.comparing import close
@@ -46,6 +47,9 @@ def test_the_sources_compile_without_a_warning(unit: Path, tmp_path: Path) -> No
         archive.extractall(tmp_path)
         names = archive.namelist()
     assert {"modelDescription.xml", "sources/mumacro.h", "sources/instance.h"} < set(names)
+    text = (tmp_path / "modelDescription.xml").read_text("utf-8")
+    for name in STARTS:
+        assert f'description="{INPUTS[name].meaning}' in text
     (source,) = (tmp_path / "sources").glob("*.c")
     for compiler in ("gcc", "clang"):
         if shutil.which(compiler):

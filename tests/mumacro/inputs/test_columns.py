@@ -122,7 +122,7 @@ BAD: dict[str, tuple[Any, str]] = {
 
 
 @pytest.mark.parametrize("kind", BAD)
-def test_what_is_no_column_of_numbers_is_refused_once_by_name(kind: str) -> None:
+def test_what_is_no_column_of_numbers_has_one_fault_with_its_name(kind: str) -> None:
     values, words = BAD[kind]
     with pytest.raises(InputError) as refusal:
         read_column("y0", values)

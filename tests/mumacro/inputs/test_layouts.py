@@ -216,6 +216,16 @@ REFUSED: dict[str, tuple[str, Refused]] = {
         HEAD + rows("{v},{m}", comma=True),
         Refused(2, "has 3 cells, the header has 2"),
     ),
+    "another header in a comment": (
+        HEAD + BEGIN + "# v0 [m/s],mu_macro\n" + MIDDLE,
+        Refused(4, "--rows 2..3"),
+    ),
+    "header with its columns changed": (
+        HEAD + BEGIN + "mu_macro,v0 [mm/s]\n" + MIDDLE,
+        Refused(4, "--rows 2..3"),
+    ),
+    "title of a segment": (HEAD + BEGIN + "\nSegment 2\n" + MIDDLE, Refused(5, "--rows 2..4")),
+    "label of a row behind it": (HEAD + BEGIN + ",Mittelwert:\n", Refused(4, "--rows 2..3")),
     "overload": (HEAD + "1,0.069\n2,OVER\n", Refused(3, "--rows 2..2")),
 }
 
@@ -237,7 +247,9 @@ def test_a_layout_is_read_as_it_is_meant(path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_a_layout_is_refused_with_its_line_and_a_remedy_that_works(path: Path, name: str) -> None:
+def test_a_layout_that_is_not_clear_gets_its_line_and_a_remedy_that_works(
+    path: Path, name: str
+) -> None:
     text, expected = REFUSED[name]
     path.write_bytes(text.encode())
     with pytest.raises(TextError) as refusal:
@@ -274,7 +286,7 @@ def damaged(text: str, chance: random.Random) -> str:
     return text
 
 
-def test_a_damaged_layout_is_read_or_refused_with_a_reason(tmp_path: Path) -> None:
+def test_a_damaged_layout_is_read_or_gets_a_reason(tmp_path: Path) -> None:
     chance, path = random.Random(1), tmp_path / "table.txt"  # noqa: S311
     texts = [text for text in READ.values() if isinstance(text, str)]
     texts += [text for text, _ in REFUSED.values()]

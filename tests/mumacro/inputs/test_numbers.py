@@ -42,7 +42,7 @@ def test_a_number_has_one_meaning(text: str, decimal: str, number: float) -> Non
         ("1_000", "", "must be a number"),
     ],
 )
-def test_what_has_none_or_two_is_refused(text: str, decimal: str, reason: str) -> None:
+def test_what_has_no_meaning_or_two_gets_its_reason(text: str, decimal: str, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         read_number(text, decimal)
 
@@ -53,7 +53,7 @@ def test_beside_a_decimal_comma_a_number_that_can_be_one_alone_stays(clear: str)
 
 
 @pytest.mark.parametrize("text", ["20.000", "1.234 kHz", "999.999"])
-def test_beside_a_decimal_comma_points_before_three_digits_are_refused(text: str) -> None:
+def test_beside_a_decimal_comma_points_before_three_digits_are_not_clear(text: str) -> None:
     check_signs({"mu0": "0.3", "f": text})
     with pytest.raises(InputError, match="clear beside mu0"):
         check_signs({"mu0": "0,3", "f": text})
@@ -84,6 +84,6 @@ def test_the_decimal_sign_of_a_table_is_found(cells: list[str], sep: str, decima
         (["0.3", "0,4"], "has a decimal point, line 2"),
     ],
 )
-def test_a_table_whose_sign_may_be_either_is_refused(cells: list[str], reason: str) -> None:
+def test_a_table_whose_sign_may_be_either_says_so(cells: list[str], reason: str) -> None:
     with pytest.raises(TextError, match=reason):
         Signs(None, None, ";").see(Cell(i, "v0", cell) for i, cell in enumerate(cells, 1))
