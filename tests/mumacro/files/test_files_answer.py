@@ -181,7 +181,7 @@ LIFTS = "must be >= 0 and below Fz: at Fz the contact lifts off"
         ),
     ],
 )
-def test_ends_of_k_and_amplitudes_are_refused(
+def test_ends_of_k_and_amplitudes_have_their_bounds(
     surrogate: Surrogate, absent: Any, columns: Any, refused: Any
 ) -> None:
     batch = batch_of(**{name: [cell] for name, cell in columns.items()}).drop_columns(absent)
@@ -308,7 +308,7 @@ def test_rigid_can_be_given_for_a_batch_without_k(surrogate: Surrogate) -> None:
     assert answers.column("source")[0].as_py() == "rigid"
 
 
-def test_a_column_without_numbers_is_refused_and_one_without_rows_answered(
+def test_a_column_without_numbers_is_named_and_one_without_rows_answered(
     surrogate: Surrogate,
 ) -> None:
     with pytest.raises(FilesError, match="the column v0 holds bool, not numbers"):

@@ -244,7 +244,7 @@ def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(
 
 
 @pytest.mark.parametrize("name", ["cases.ndjson", "cases.jsonl.gz", "-"])
-def test_json_is_no_table_and_the_refusal_says_what_to_write(
+def test_json_is_no_table_and_is_told_what_to_write(
     tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     (tmp_path / "cases.ndjson").write_text(json.dumps(CASE))
@@ -273,36 +273,6 @@ def test_cells_with_line_ends_do_not_shift_the_numbers_of_lines(
     assert [row["name"] for row in read(tmp_path / "out.csv")] == ["a\nb", "c", "f\ng"] * 3
     # the lines in which the rows begin
     assert [line for line, *_ in rejects_of(tmp_path / "out.csv")] == [5, 8, 14, 17, 23, 26]
-
-
-@pytest.mark.parametrize("end", ["csv", "parquet"])
-@pytest.mark.parametrize(("rows", "bad"), [(1, '"b'), (1, '"b" c'), (150_000, '"b')])
-def test_an_open_quote_names_its_row(
-    tmp_path: Path, capsys: Capture, end: Any, rows: Any, bad: Any
-) -> None:
-    text = f"name,{HEADER}\n" + f"a,{GOOD}\n" * rows + f"{bad},{GOOD}\n" + f"c,{GOOD}\n" * 50
-    (tmp_path / "cases.csv").write_text(text)
-    message = ran(capsys, 1, tmp_path / "cases.csv", "-o", tmp_path / f"out.{end}")
-    assert f"line {rows + 2}: a quote is not closed" in message
-    assert [path.name for path in tmp_path.iterdir()] == ["cases.csv"]
-
-
-@pytest.mark.parametrize(
-    ("content", "parts"),
-    [
-        ("", ["must name the columns, and is empty"]),
-        ("a;b;c\n1;2;3\n", ["line 1: there are no columns mu0", "'b'"]),
-        ('"mu0,Fz\n', ["line 1: there are no columns"]),
-        ("mu0,Fz,y0,omega,v0\n", ["line 1: there is no column k", "'Fz'", "--rigid"]),
-    ],
-)
-def test_a_file_without_cases_is_refused_by_name(
-    tmp_path: Path, capsys: Capture, content: Any, parts: Any
-) -> None:
-    (tmp_path / "cases.csv").write_bytes(content.encode())
-    message = ran(capsys, 1, tmp_path / "cases.csv", "-o", tmp_path / "out.csv")
-    assert all(part in message for part in [str(tmp_path / "cases.csv"), *parts])
-    assert [path.name for path in tmp_path.iterdir()] == ["cases.csv"]
 
 
 def test_damaged_and_missing_files_are_reported_in_one_line(

@@ -166,40 +166,6 @@ def test_files_that_differ_in_their_dialect_alone_are_one(tmp_path: Path) -> Non
         evaluate_files(files, tmp_path / "o.csv", TABLE)
 
 
-@pytest.mark.parametrize(
-    ("text", "parts"),
-    [
-        (
-            f"{HEAD}\n{ROWS}".replace(",", "\t")
-            .replace("0.3", "1")
-            .replace("1e6", "1.000")
-            .replace("2e-6", "2")
-            .replace("3e-6", "3")
-            .replace("0.01", "1"),
-            ("line 2: k '1.000'", "1 or 1000"),
-        ),
-        (f"a\n{HEAD}\n{ROWS}v0,f,y0,k,Fz,mu0\n{ROWS}", ("line 5 is another header",)),
-        (f"{HEAD}\nm,N,N/m,m,Hz,m/s\n{ROWS}", ("line 2", "mu0")),
-        (f"{HEAD}\n{ROWS}\0\0", ("line 4 has a zero byte",)),
-        (f"{HEAD}\n" + "1," * (9 * 2**20), ("line 2 has more than 16 MiB",)),
-        (f"{HEAD}\n{ROWS}" + "1" * (17 * 2**20), ("line 4 has more than 16 MiB",)),
-        ("{}", ("it is JSON",)),
-    ],
-    ids=["ambiguous", "another header", "no unit", "zero", "wide", "long", "json"],
-)
-@pytest.mark.parametrize("end", ["csv", "parquet"])
-def test_what_is_refused_leaves_nothing(
-    tmp_path: Path, capsys: Capture, text: str, parts: tuple[str, ...], end: str
-) -> None:
-    (tmp_path / "cases.csv").write_text(text)
-    assert main(["eval", str(tmp_path / "cases.csv"), "-o", str(tmp_path / f"out.{end}")]) == 1
-    said = capsys.readouterr().err
-    assert all(part in said for part in parts), said[:500]
-    assert "Traceback" not in said
-    assert len(said) < 2000
-    assert [path.name for path in tmp_path.iterdir()] == ["cases.csv"]
-
-
 TABLE_BYTES = f"{HEAD},note\n{ROWS}".replace("01\n", "01,a\n").encode()
 MIB = 2**20
 #: files that are no tables, or damaged ones, and what is said of each
@@ -234,6 +200,32 @@ HOSTILE: dict[str, tuple[Callable[[], bytes], str]] = {
         lambda: TABLE_BYTES.replace(b",", b";") + b"0,3;10;1e6;2e-6;2e4;0,01;a\n",
         "line 4: mu0 '0,3' a decimal comma",
     ),
+    "a number of two meanings": (
+        lambda: (
+            TABLE_BYTES.replace(b",", b"\t")
+            .replace(b"0.3", b"1")
+            .replace(b"1e6", b"1.000")
+            .replace(b"2e-6", b"2")
+            .replace(b"3e-6", b"3")
+            .replace(b"0.01", b"1")
+        ),
+        "line 2: k '1.000' may be 1 or 1000",
+    ),
+    "a unit of another input": (
+        lambda: TABLE_BYTES.replace(b"note\n", b"note\nm,N,N/m,m,Hz,m/s,-\n"),
+        "units that cannot be assigned to the columns mu0",
+    ),
+    "JSON": (lambda: b"{}", "it is JSON"),
+    "other columns": (lambda: b"a;b;c\n1;2;3\n", "line 1: there are no columns mu0"),
+    "a head of words alone": (
+        lambda: b"contact,note\nball,1\n",
+        "line 1: there are no columns mu0",
+    ),
+    "no column of k": (lambda: b"mu0,Fz,y0,omega,v0\n", "line 1: there is no column k"),
+    "a missing column beside a bad row": (
+        lambda: f"{HEAD.replace('v0', 'w0')}\n{ROWS}Mean,10,1,1,1,1\n".encode(),
+        "line 1: there is no column v0",
+    ),
     "two tables": (
         lambda: TABLE_BYTES + TABLE_BYTES.replace(b"v0", b"v0 [mm/s]"),
         "line 4 is another header",
@@ -241,13 +233,14 @@ HOSTILE: dict[str, tuple[Callable[[], bytes], str]] = {
 }
 
 
+@pytest.mark.parametrize("end", ["csv", "parquet"])
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_file_that_is_no_table_gets_one_line_and_leaves_nothing(
-    tmp_path: Path, capsys: Capture, name: str
+    tmp_path: Path, capsys: Capture, name: str, end: str
 ) -> None:
     data, what = HOSTILE[name]
     (tmp_path / "cases.csv").write_bytes(data())
-    assert main(["eval", str(tmp_path / "cases.csv"), "-o", str(tmp_path / "out.csv")]) == 1
+    assert main(["eval", str(tmp_path / "cases.csv"), "-o", str(tmp_path / f"out.{end}")]) == 1
     (said,) = capsys.readouterr().err.splitlines()
     assert said.startswith(f"mumacro eval: {tmp_path / 'cases.csv'}: ")
     assert what in said
@@ -292,18 +285,6 @@ def test_a_row_without_a_value_is_rejected_and_the_run_goes_on(tmp_path: Path) -
     (tmp_path / "cases.csv").write_text(text)
     summary = evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
     assert (summary.answered, summary.rejected) == (2, 2)
-
-
-def test_a_column_that_is_missing_is_told_before_what_is_wrong_with_a_row(tmp_path: Path) -> None:
-    (tmp_path / "cases.csv").write_text(f"{HEAD.replace('v0', 'w0')}\n{ROWS}Mean,10,1,1,1,1\n")
-    with pytest.raises(FilesError, match="line 1: there is no column v0"):
-        evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
-
-
-def test_a_table_of_words_alone_is_told_which_columns_are_missing(tmp_path: Path) -> None:
-    (tmp_path / "cases.csv").write_text("contact,note\nball,1\n")
-    with pytest.raises(FilesError, match="line 1: there are no columns mu0"):
-        evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
 
 
 @settings(max_examples=40, deadline=None)
@@ -468,42 +449,16 @@ def test_what_is_no_row_ends_the_run_with_and_without_quotes(
     assert friction(tmp_path / "out.csv") == close(MU, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    "label",
-    [
-        "Mean",
-        "AVERAGE",
-        "Avg.",
-        "median",
-        "Mittelwert",
-        "MW",
-        "moyenne",
-        "Min",
-        "Maximum",
-        "Sum",
-        "Total",
-        "Range",
-        "Spannweite",
-        "Variance",
-        "CoV",
-        "cv",
-        "s.d.",
-        "SD",
-        "RSD",
-        "Count",
-        "Std",
-        "stdev",
-        "Stabw",
-        "Ecart-type",
-        "minimum",
-        "max. value",
-        "Std. Dev.",
-        "Standard deviation",
-        "Écart type",
-        "standard error",
-        "mean of 3",
-    ],
-)
+#: what begins a row of statistics: in three languages, short and with words behind it
+LABELS = [
+    *("Mean", "AVERAGE", "Avg.", "median", "Min", "Maximum", "minimum", "Sum", "Total", "Range"),
+    *("Variance", "CoV", "cv", "s.d.", "SD", "RSD", "Count", "Std", "stdev"),
+    *("Mittelwert", "MW", "Spannweite", "Stabw", "moyenne", "Ecart-type", "Écart type"),
+    *("max. value", "Std. Dev.", "Standard deviation", "standard error", "mean of 3"),
+]
+
+
+@pytest.mark.parametrize("label", LABELS)
 @pytest.mark.parametrize("quote", ["", '"'])
 def test_a_row_of_statistics_is_found_behind_any_name(
     tmp_path: Path, label: str, quote: str
