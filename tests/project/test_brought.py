@@ -42,7 +42,7 @@ def of(*ways: str) -> pytest.MarkDecorator:
 
 
 @of("python")
-def test_a_value_in_python_is_understood_or_refused(case: Any) -> None:
+def test_a_value_in_python_is_understood_or_named(case: Any) -> None:
     for package in case["needs"]:
         reason = f"{package} of requirements/peers.txt is not installed"
         pytest.importorskip(package, reason=reason)

@@ -3,7 +3,6 @@ refuses."""
 
 import datetime
 import decimal
-import fractions
 import functools
 import importlib
 import json
@@ -42,97 +41,34 @@ def _registry() -> Any:
 # --- kinds: a change of the usual case, and the same in SI numbers, or the name that is refused ---
 
 Kind = tuple[Callable[[], Read], "Read | str"]
+#: one of each sort: what is understood of a text is listed in test_case.py
 TEXTS: dict[str, Kind] = {
     "number": (lambda: {"y0": 2.5e-6}, {"y0": 2.5e-6}),
-    "text in SI": (lambda: {"y0": "2.5e-6"}, {"y0": 2.5e-6}),
     "text with a unit": (lambda: {"y0": "2.5um", "v0": "12 mm/s"}, {"y0": 2.5e-6, "v0": 0.012}),
     "decimal comma": (lambda: {"y0": "2,5 um"}, {"y0": 2.5e-6}),
-    "another unit system": (lambda: {"Fz": "1 kgf"}, {"Fz": 9.80665}),
-    "exponents": (lambda: {"k": "1200 N mm^-1"}, {"k": 1.2e6}),
-    "per cent": (lambda: {"mu0": "25 %"}, {"mu0": 0.25}),
-    "rpm": (lambda: {"f": "600000 rpm"}, {"f": 1e4}),
     "wrong dimension": (lambda: {"y0": "2 N"}, "y0"),
     "peak to peak": (lambda: {"y0": "4umpp"}, "y0"),
-    "mass": (lambda: {"Fz": "100 g"}, "Fz"),
     "ambiguous": (lambda: {"Fz": "1,000"}, "Fz"),
-    "no number": (lambda: {"v0": "fast"}, "v0"),
     "interval of another input": (lambda: {"y0": "1um..2um"}, "y0"),
     "misspelt name": (lambda: {"vo": 0.02}, "vo"),
     "name with a unit": (lambda: {"v0 [mm/s]": 20}, "v0 [mm/s]"),
     "negative": (lambda: {"v0": "-1 mm/s"}, "v0"),
-    "thin spaces": (
-        lambda: {"k": "1\u202f200\u202f000\u2009N/m", "y0": "2.5\u00a0µm"},
-        {"k": 1.2e6, "y0": 2.5e-6},
-    ),
-    "full width": (lambda: {"y0": "２．５ｕｍ"}, {"y0": 2.5e-6}),
-    "one sign for a unit": (lambda: {"y0": "2.5 ㎛", "f": "21 ㎑"}, {"y0": 2.5e-6, "f": 21e3}),
-    "marks that are not seen": (lambda: {"y0": "\ufeff\u200e2.5\u2060um"}, {"y0": 2.5e-6}),
-    "minus of typography": (lambda: {"y0": "2.5e−6", "k": "1.2×10⁶"}, {"y0": 2.5e-6, "k": 1.2e6}),
-    "power as in code": (lambda: {"y0": "2.5*10**-6 m"}, {"y0": 2.5e-6}),
-    "Fortran": (lambda: {"y0": "2.5D-6"}, {"y0": 2.5e-6}),
-    "Swiss thousands": (lambda: {"k": "1’200’000"}, {"k": 1.2e6}),
-    "unit in words": (lambda: {"k": "1200 newtons per millimetre"}, {"k": 1.2e6}),
-    "pounds": (lambda: {"k": "5710.147 lbf/in"}, {"k": 5710.147 * 4.4482216152605 / 0.0254}),
-    "turns": (lambda: {"f": "600000 rev/min"}, {"f": 1e4}),
-    "kilometres per hour": (lambda: {"v0": "0.036 kmh"}, {"v0": 0.01}),
-    "zero to peak": (lambda: {"y0": "2.5 um 0-pk"}, {"y0": 2.5e-6}),
-    "per mille": (lambda: {"mu0": "250 ‰"}, {"mu0": 0.25}),
-    "other digits": (lambda: {"y0": "٢.٥um"}, "y0"),
-    "fraction": (lambda: {"mu0": "½"}, "mu0"),
-    "division": (lambda: {"mu0": "1/4"}, "mu0"),
-    "level": (lambda: {"mu0": "-10 dB"}, "mu0"),
-    "modulus": (lambda: {"k": "210 GPa"}, "k"),
-    "acceleration": (lambda: {"y0": "5 g"}, "y0"),
-    "rms": (lambda: {"y0": "2 um rms"}, "y0"),
-    "turns as a speed": (lambda: {"v0": "60 rpm"}, "v0"),
-    "prefix alone": (lambda: {"k": "1.2M"}, "k"),
-    "small letters": (lambda: {"f": "21 khz"}, "f"),
-    "radians as a frequency": (lambda: {"f": "130000 rad/s"}, "f"),
-    "about": (lambda: {"k": "~1.2e6"}, "k"),
-    "less than": (lambda: {"v0": "<0.01"}, "v0"),
-    "infinity": (lambda: {"k": "∞"}, "k"),
-    "interval with a dash": (lambda: {"k": "0.8–1.2 N/um"}, "k"),
-    "last digits": (lambda: {"k": "1.00(10) N/um"}, "k"),
-    "per cent behind a deviation": (lambda: {"mu0": "30 ± 2 %"}, "mu0"),
-    "interval and deviation": (lambda: {"k": "0.8..1.2 ± 0.1 N/um"}, "k"),
-    "two values": (lambda: {"y0": "2um 3um"}, "y0"),
-    "date": (lambda: {"v0": "2026-11-27"}, "v0"),
-    "complex": (lambda: {"v0": "1+2j"}, "v0"),
-    "word of a truth": (lambda: {"v0": "true"}, "v0"),
-    "beyond doubles": (lambda: {"k": "1e400"}, "k"),
     "blank": (lambda: {"k": " "}, "k"),
 }
 #: deviations and intervals, which evaluate and its forms take: mu_macro, its deviation, its least
 SPREADS: dict[str, tuple[Read, Read]] = {
     "deviation": ({"k": "1 ± 0.1 N/um"}, {"std_k": 1e5}),
-    "deviation in ASCII": ({"k": "1 N/um +/- 100 N/mm"}, {"std_k": 1e5}),
-    "share": ({"k": "1 N/um +- 10%"}, {"std_k": 1e5}),
     "percentage points": ({"mu0": "30 % ± 2 %"}, {"std_mu0": 0.02}),
-    "decimal commas": ({"mu0": "0,30 ± 0,02"}, {"std_mu0": 0.02}),
     "of a frequency": ({"f": "20 ± 1 kHz"}, {"std_f": 1e3}),
     "interval": ({"k": "0.8..1.2 N/um"}, {"k_low": 0.8e6, "k_high": 1.2e6}),
-    "interval of two units": ({"k": "800N/mm … 1,2N/um"}, {"k_low": 0.8e6, "k_high": 1.2e6}),
 }
-#: what has no text: objects of Python, NumPy and pandas
+#: what has no text, one of each sort: numbers of any type are in test_case.py
 OBJECTS: dict[str, Kind] = {
     "Decimal": (lambda: {"y0": decimal.Decimal("2.5e-6")}, {"y0": 2.5e-6}),
-    "Fraction": (lambda: {"mu0": fractions.Fraction(1, 4)}, {"mu0": 0.25}),
-    "NumPy's text": (lambda: {"y0": np.array("2.5um")}, {"y0": 2.5e-6}),
-    "masked array": (lambda: {"mu0": np.ma.array(0.25)}, {"mu0": 0.25}),
     "truth": (lambda: {"mu0": True}, "mu0"),
-    "NumPy's truth": (lambda: {"mu0": np.bool_(True)}, "mu0"),
-    "complex": (lambda: {"v0": 0.01 + 0.0j}, "v0"),
     "date": (lambda: {"v0": datetime.date(2026, 11, 27)}, "v0"),
-    "duration": (lambda: {"v0": datetime.timedelta(seconds=1)}, "v0"),
-    "Timestamp": (lambda: {"v0": pd.Timestamp("2026-11-27")}, "v0"),
-    "Timedelta": (lambda: {"v0": pd.Timedelta("1s")}, "v0"),
     "NA": (lambda: {"k": pd.NA}, "k"),
-    "NaT": (lambda: {"v0": pd.NaT}, "v0"),
     "None": (lambda: {"k": None}, "k"),
-    "bytes": (lambda: {"v0": b"0.01"}, "v0"),
-    "set": (lambda: {"v0": {0.01}}, "v0"),
-    "whole number beyond doubles": (lambda: {"k": 10**400}, "k"),
-    "Decimal beyond doubles": (lambda: {"k": decimal.Decimal("1e400")}, "k"),
     "frame": (lambda: {"v0": pd.DataFrame({"a": [0.01]})}, "v0"),
 }
 
@@ -185,23 +121,9 @@ QUANTITIES: dict[str, tuple[str, Kind]] = {
 }
 _TWO = {"y0": [2e-6, 3e-6]}
 ARRAYS: dict[str, tuple[str, Kind]] = {
-    "array": ("numpy", (lambda: {"y0": np.array([2e-6, 3e-6])}, _TWO)),
     "texts": ("numpy", (lambda: {"y0": ["2um", "3um"]}, "y0")),
-    "masked": ("numpy", (lambda: {"y0": np.ma.array([2e-6, 3e-6])}, _TWO)),
-    "Decimals": ("numpy", (lambda: {"y0": [decimal.Decimal("2e-6"), 3e-6]}, _TWO)),
-    "index": ("numpy", (lambda: {"y0": pd.Index([2e-6, 3e-6])}, _TWO)),
-    "column of texts": (
-        "numpy",
-        (lambda: {"y0": pd.Series(["2um", "3 um"], dtype="string")}, "y0"),
-    ),
-    "long doubles": (
-        "numpy",
-        (lambda: {"mu0": np.array([0.25, 0.5], np.longdouble)}, {"mu0": [0.25, 0.5]}),
-    ),
     "a truth among numbers": ("numpy", (lambda: {"mu0": [0.3, True]}, "mu0")),
-    "truths": ("numpy", (lambda: {"mu0": np.array([True, False])}, "mu0")),
     "lists of two lengths": ("numpy", (lambda: {"y0": [[2e-6], [2e-6, 3e-6]]}, "y0")),
-    "dates": ("numpy", (lambda: {"v0": pd.Series(pd.date_range("2026", periods=2))}, "v0")),
     "pint array": ("pint", (lambda: {"y0": pint(np.array([2.0, 3.0]), "um")}, _TWO)),
     "list of pint": ("pint", (lambda: {"y0": [pint(2.0, "um"), pint(3e-3, "mm")]}, "y0")),
     "astropy array": ("astropy.units", (lambda: {"y0": [2.0, 3.0] * _unit("um")}, _TWO)),
@@ -371,7 +293,7 @@ def judged(entrance: Callable[[Read], Any], kind: Kind, right: Callable[[Read], 
 
 @pytest.mark.parametrize("entrance", PYTHON)
 @pytest.mark.parametrize("kind", TEXTS)
-def test_a_typed_value_is_understood_or_refused(kind: str, entrance: str) -> None:
+def test_a_typed_value_is_understood_or_named(kind: str, entrance: str) -> None:
     _try(TEXTS[kind], entrance)
 
 
@@ -383,13 +305,13 @@ def _try(of_kind: Kind, entrance: str) -> None:
 
 @pytest.mark.parametrize("entrance", PYTHON)
 @pytest.mark.parametrize("kind", OBJECTS)
-def test_an_object_is_understood_or_refused(kind: str, entrance: str) -> None:
+def test_an_object_is_understood_or_named(kind: str, entrance: str) -> None:
     _try(OBJECTS[kind], entrance)
 
 
 @pytest.mark.parametrize("entrance", PYTHON)
 @pytest.mark.parametrize("kind", by_package(QUANTITIES))
-def test_a_value_with_a_unit_is_understood_or_refused(kind: str, entrance: str) -> None:
+def test_a_value_with_a_unit_is_understood_or_named(kind: str, entrance: str) -> None:
     module, of_kind = QUANTITIES[kind]
     _importable(module)
     _try(of_kind, entrance)
@@ -401,7 +323,7 @@ def _importable(module: str) -> None:
 
 @pytest.mark.parametrize("entrance", ["keywords", "mapping", "motion"])
 @pytest.mark.parametrize("kind", by_package(ARRAYS))
-def test_arrays_of_any_kind_are_understood_or_refused(kind: str, entrance: str) -> None:
+def test_arrays_of_any_kind_are_understood_or_named(kind: str, entrance: str) -> None:
     module, of_kind = ARRAYS[kind]
     _importable(module)
     judged(PYTHON[entrance], of_kind, PYTHON[entrance])
@@ -423,7 +345,7 @@ def test_a_value_with_a_deviation_of_its_own_is_understood(kind: str) -> None:
 
 @pytest.mark.parametrize("quoted", ["apart", "together"])
 @pytest.mark.parametrize("kind", TEXTS)
-def test_the_command_understands_or_refuses(capsys: Capture, kind: str, quoted: str) -> None:
+def test_the_command_understands_or_names(capsys: Capture, kind: str, quoted: str) -> None:
     make, meant = TEXTS[kind]
     words = [f"{name}={value}" for name, value in {**BASE, **make()}.items()]
     words = words if quoted == "apart" else [" ".join(words)]
@@ -458,7 +380,7 @@ FORMS = ["query", "one", "rows", "columns"]
 
 @pytest.mark.parametrize("form", FORMS[:2])
 @pytest.mark.parametrize("kind", TEXTS)
-def test_http_understands_or_refuses(live_server: Any, kind: str, form: str) -> None:
+def test_http_understands_or_names(live_server: Any, kind: str, form: str) -> None:
     make, meant = TEXTS[kind]
     status, answer = _asked(live_server, make(), form)
     if isinstance(meant, str):
@@ -470,23 +392,6 @@ def test_http_understands_or_refuses(live_server: Any, kind: str, form: str) -> 
     assert math.isclose(answer["mu_macro"], keywords({**BASE, **meant}), rel_tol=1e-9)
 
 
-OF_TEXTS = [kind for kind, (make, _) in TEXTS.items() if {*map(type, make().values())} == {str}]
-
-
-@pytest.mark.parametrize("form", FORMS[2:])
-@pytest.mark.parametrize("kind", OF_TEXTS)
-def test_a_batch_over_http_takes_no_text_but_rigid(live_server: Any, kind: str, form: str) -> None:
-    change = TEXTS[kind][0]()
-    status, answer = _asked(live_server, change, form)
-    if str(change.get("k", "")).strip().lower() == "rigid":
-        got = answer["results"][0] if form == "rows" else answer
-        assert np.ravel(got["mu_macro"])[0] == keywords({**BASE, "k": "rigid"})
-        return
-    assert status == {"rows": 200, "columns": 422}[form]
-    assert answer["errors"]
-    assert {fault["field"] for fault in answer["errors"]} <= change.keys()
-
-
 #: values of JSON that are no numbers and no texts
 STRANGE: dict[str, Any] = {"true": True, "null": None, "list": [[2e-6]], "object": {"um": 2}}
 
@@ -494,9 +399,7 @@ STRANGE: dict[str, Any] = {"true": True, "null": None, "list": [[2e-6]], "object
 @pytest.mark.parametrize("form", FORMS[1:])
 @pytest.mark.parametrize("name", BASE)
 @pytest.mark.parametrize("kind", STRANGE)
-def test_json_that_is_no_value_is_refused(
-    live_server: Any, kind: str, name: str, form: str
-) -> None:
+def test_json_that_is_no_value_is_named(live_server: Any, kind: str, name: str, form: str) -> None:
     status, answer = _asked(live_server, {name: STRANGE[kind]}, form)
     assert status == 422 or form in ("rows", "columns")
     fields = {fault["field"] for fault in answer["errors"]}

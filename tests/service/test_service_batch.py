@@ -25,7 +25,7 @@ def one(client: Any, case: Case) -> Any:
 
 
 UNKNOWN = ("speed", "", "mu\ud800", "}", "]")
-BAD_ROWS = [
+BAD_ROWS: list[tuple[Any, str | None, str]] = [
     ({"mu0": 0}, "mu0", "must be finite and > 0"),
     *((entry, None, "must be an object") for entry in (17, None, "a:b", True, [1])),
     ({"mu0": {"a": 1}}, "mu0", "must be a number"),

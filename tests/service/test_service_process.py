@@ -22,7 +22,7 @@ from typing import Any
 import pytest
 
 from mumacro import Surrogate
-from service.observe import LogLines, for_people
+from service.observe import LogLines
 from tests.support.cases import Case
 from tests.support.places import ROOT
 from tests.support.serving import CASE, connect, head, to_end
@@ -352,10 +352,16 @@ def test_at_a_terminal_it_speaks_to_a_person(repository: Path, words: tuple[str,
     assert b"{" not in shown
 
 
-def test_a_line_for_people_moves_no_cursor_and_forges_no_line() -> None:
-    now = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+def test_a_line_for_people_moves_no_cursor_and_forges_no_line(
+    monkeypatch: pytest.MonkeyPatch, capfd: Any
+) -> None:
+    monkeypatch.setattr(os, "isatty", lambda _: True)
+    lines, now = LogLines(), datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
     line = {"time": now, "level": "warning", "logger": "x", "message": "a\x1b[2J\nb µ", "n": 1}
-    assert for_people(line) == "03:04:05  warning: a\\x1b[2J\\x0ab µ n=1\n".encode()
+    lines.put(line)
+    lines.flush()
+    LogLines.running = None
+    assert capfd.readouterr().out == "03:04:05  warning: a\\x1b[2J\\x0ab µ n=1\n"
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,7 @@
 import asyncio
 import json
 import time
-from collections.abc import Callable, Coroutine
-from types import SimpleNamespace
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -14,23 +13,8 @@ from service.admission import Admission, Ticket
 from service.bodies import read_body
 from service.problems import FULL, RequestError
 from service.security import HEALTH_PATHS, Entrance
-from service.settings import Settings
+from tests.support.admitting import run, scope_of
 from tests.support.serving import CASE
-
-
-def run(main: Callable[[Admission], Coroutine[Any, Any, None]], **settings: Any) -> None:
-    """Run a coroutine with an admission of these settings."""
-
-    async def with_loop() -> None:
-        await main(Admission(Settings(**settings)))
-
-    asyncio.run(with_loop())
-
-
-def scope_of(admission: Admission) -> dict[str, Any]:
-    """What a request to an application with this admission has."""
-    app = SimpleNamespace(state=SimpleNamespace(admission=admission))
-    return {"type": "http", "path": "/v1/law", "app": app, "client": ("10.1.2.3", 1)}
 
 
 def test_a_request_that_goes_as_it_is_admitted_keeps_no_slot() -> None:
@@ -67,7 +51,7 @@ def test_of_those_who_wait_the_client_with_the_fewest_slots_comes_first() -> Non
     run(main, max_computations=8)
 
 
-def test_a_body_that_grows_counts_once_and_a_refusal_is_counted() -> None:
+def test_a_body_that_grows_counts_once_and_one_too_many_is_counted() -> None:
     async def main(admission: Admission) -> None:
         ticket = Ticket(scope_of(admission))
         ticket.weigh(800)
@@ -125,7 +109,7 @@ def test_beyond_the_connections_only_the_probes_are_answered(path: str) -> None:
         answered.append(scope["path"])
 
     async def main(admission: Admission) -> None:
-        full = {**scope_of(admission), "state": {FULL: True}}
+        full = scope_of(admission, state={FULL: True})
         ends: Any = None
         await Entrance(app)({**full, "path": path}, ends, ends)
         with pytest.raises(RequestError, match="too many connections"):
@@ -134,6 +118,23 @@ def test_beyond_the_connections_only_the_probes_are_answered(path: str) -> None:
 
     run(main)
     assert answered == [path, "/v1/law"]
+
+
+@pytest.mark.parametrize(
+    ("scope", "client"),
+    [
+        ({"client": ("10.0.0.1", 80)}, "10.0.0.1"),
+        ({"client": ("2001:db8:1:2:3::4", 80)}, "2001:db8:1:2::/64"),
+        ({"client": ("x:y" * 99, 0)}, ("x:y" * 99)[:64]),
+        ({"client": None}, ""),
+        ({"client": ("10.0.0.1", 80), "key_holder": "lab"}, "key lab"),
+    ],
+)
+def test_a_client_is_a_key_an_address_or_a_network(scope: dict[str, Any], client: str) -> None:
+    async def main(admission: Admission) -> None:
+        assert Ticket(scope_of(admission, **scope)).client == client
+
+    run(main)
 
 
 @pytest.mark.parametrize(
@@ -165,7 +166,7 @@ def test_only_what_is_below_the_guide_is_open(started: Any, path: str, needs_key
         (-(2**63) - 1, "an integer of many digits"),
     ],
 )
-def test_a_refusal_shows_an_integer_as_long_as_json_has_it(
+def test_an_integer_at_fault_is_shown_as_long_as_json_has_it(
     client: Any, problem: Callable[[Any, int], Any], number: int, shown: object
 ) -> None:
     document = problem(client.post("/v1/mu-macro", json={**CASE, "contact": number}), 422)

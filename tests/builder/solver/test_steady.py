@@ -18,7 +18,6 @@ from builder.solver.slip import (
     ANGLE,
     CHART,
     MIN_SPEED,
-    NO_SLIP,
     OK,
     PATH,
     SIGMA,
@@ -286,7 +285,7 @@ def test_orbit_lost_on_the_border_itself_is_no_answer(v: float, y: float) -> Non
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, -0.0, math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize(("field", "bounds"), [("v_tilde", V_RANGE), ("y_tilde", Y_RANGE)])
-def test_inputs_out_of_range_are_refused(
+def test_inputs_out_of_range_are_named(
     field: str, bounds: tuple[float, float], bad: float, sweep: Sweep
 ) -> None:
     low, high = bounds
@@ -305,7 +304,7 @@ def test_inputs_out_of_range_are_refused(
 
 
 @pytest.mark.parametrize("eta", [math.nan, 0.1, -0.5 + 1e-15])
-def test_an_excess_that_is_not_that_of_the_amplitude_is_refused(eta: float, sweep: Sweep) -> None:
+def test_an_excess_must_be_that_of_the_amplitude(eta: float, sweep: Sweep) -> None:
     for ask in (
         lambda: solve(0.1, 0.5, eta),
         lambda: sweep.solve("full", np.array([0.1]), np.array([0.5]), np.array([eta])),
@@ -325,11 +324,3 @@ def test_every_status_has_advice() -> None:
     }
     assert codes == set(ADVICE)
     assert all(ADVICE.values())
-
-
-def test_a_stick_phase_without_end_has_its_own_status() -> None:
-    # slip stops with the spring nearly transverse: a stroke of 2 y~ = 0.4 cannot stretch it to the
-    # limit again
-    w, out, orbit, _ = workspace()
-    _, status = sections._angle_section(1e-3, 0.2, -0.8, 1.2, 0, w, out, orbit)
-    assert status == NO_SLIP

@@ -12,7 +12,7 @@ from scipy.special import ellipe, ellipk
 
 from builder.solver.ball import NAMES, Ball, Springs
 from builder.solver.sweep import Sweep
-from builder.tables.build import BuildError, springs_for
+from builder.tables.build import SOLVED_BY, BuildError
 from builder.tables.contacts import BALL_NOISE, SolvedContact, ball, ratio_of
 from builder.tables.draws import DRAWS
 from builder.tables.measure import block_errors
@@ -50,16 +50,16 @@ def wide(n: int, seed: int) -> tuple[Array, Array]:
 
 
 def test_the_springs_of_a_ball_are_those_of_the_finest_table(sweep: Sweep) -> None:
+    points = wide(20, 2)
     finest, coarse = (
-        springs_for(opened(tolerance).table, sweep.workers).fine.table.contacts["spring"].blocks
+        SOLVED_BY["ball"](opened(tolerance).table, COARSE, sweep).solve(*points)
         for tolerance in (1e-12, 1e-4)
     )
-    for one, other in zip(finest, coarse, strict=True):
-        for name in one.nodes:
-            assert np.array_equal(one.nodes[name], other.nodes[name]), name
+    for name in finest:
+        assert np.array_equal(finest[name], coarse[name]), name
 
 
-def test_springs_that_the_solver_does_not_give_are_refused(
+def test_springs_that_the_solver_does_not_give_end_a_build_with_advice(
     sweep: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fine = opened(1e-12)
@@ -70,16 +70,16 @@ def test_springs_that_the_solver_does_not_give_are_refused(
     contacts = fine.table.contacts | {"spring": dataclasses.replace(entry, blocks=changed)}
     table = dataclasses.replace(fine.table, contacts=contacts)
     with pytest.raises(BuildError, match=r"this table is not what the solver gives now"):
-        springs_for(table, sweep.workers)
+        SOLVED_BY["ball"](table, COARSE, sweep)
     write_table(table, path)
     monkeypatch.setattr(bundled, "bundled_tables", lambda: [path])
     coarse = opened(1e-4).table
     with pytest.raises(BuildError, match=r"not what the solver gives now; .* --tolerance 1e-12"):
-        springs_for(coarse, sweep.workers)
+        SOLVED_BY["ball"](coarse, COARSE, sweep)
     for left in ([], [TABLES / "mumacro-1e-7.nc"]):
         monkeypatch.setattr(bundled, "bundled_tables", lambda left=left: left)
         with pytest.raises(BuildError, match=r"table.*; a ball .* first: .* --tolerance 1e-12"):
-            springs_for(coarse, sweep.workers)
+            SOLVED_BY["ball"](coarse, COARSE, sweep)
 
 
 # --- the solver -----------------------------------------------------------------------------------
@@ -348,7 +348,7 @@ def test_plain_numbers_answer_as_arrays_do() -> None:
 
 
 @pytest.mark.parametrize(("name", "value"), [("mu0", -0.3), ("v0", math.nan), ("k", 0.0)])
-def test_an_illegal_plain_number_is_refused(name: str, value: float) -> None:
+def test_an_illegal_plain_number_is_named(name: str, value: float) -> None:
     case: Any = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1e5, "y0": 2e-6, "v0": 0.01}
     with refused(name):
         opened(COARSE).evaluate(**{**case, name: value}, contact="ball")

@@ -10,8 +10,9 @@ from numpy.polynomial import chebyshev
 
 from mumacro.kernel.binding import Kernel, kernels
 from mumacro.table import atlas
-from mumacro.table.atlas import BLOCK_NAMES, CHARTS, SQRT2, Axis, Chart
-from mumacro.table.polynomials import WIDTH, cells_1d, cells_2d, nodes
+from mumacro.table.atlas import BLOCK_NAMES, BORDER_PIECES, CHARTS, SQRT2, Axis, Chart
+from mumacro.table.blocks import BorderPiece
+from mumacro.table.polynomials import WIDTH, border_cells, cells_2d, nodes
 from tests.support.cases import Array
 from tests.support.comparing import close
 from tests.support.made_cells import Cells
@@ -39,7 +40,8 @@ def test_cells_reproduce_a_polynomial_of_their_degree(cells: int) -> None:
     rng = np.random.default_rng(cells)
     c = rng.normal(size=WIDTH)
     values: Any = chebyshev.chebval(nodes(20, -1.0, 1.0), c)
-    local = cells_1d(0, values, cells)  # of v~crit, in y~^2
+    axis = BORDER_PIECES[0][1]  # of v~crit, in y~^2
+    local, _ = border_cells([BorderPiece(nodes(20, axis.low, axis.high), values, cells)])
     assert local.shape == (cells, WIDTH)
     for x in np.linspace(0.0, 1.0, 57):
         i = min(int(x * cells), cells - 1)

@@ -302,7 +302,7 @@ REFUSED: list[tuple[str, Any, Case, str]] = [
 
 
 @pytest.mark.parametrize(("direction", "question", "changed", "place"), REFUSED)
-def test_a_bad_question_is_refused(
+def test_a_bad_question_names_its_field(
     surrogate: Surrogate, direction: str, question: Any, changed: Case, place: str
 ) -> None:
     keywords, _, case = as_kind(CASE, ("spring", direction))

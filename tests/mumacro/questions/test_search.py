@@ -10,7 +10,7 @@ import pytest
 
 from mumacro import Surrogate, solve_for, solve_motion
 from mumacro.kernel.arrays import Array, Places
-from mumacro.questions.search import TINY, Search, last_double, samples, turning_points
+from mumacro.questions.search import TINY, Search, last_double, samples
 from mumacro.questions.solutions import Reach
 from tests.support.cases import CASE, without
 from tests.support.comparing import close
@@ -130,12 +130,6 @@ def test_targets_of_a_costly_function_share_its_samples() -> None:
     roots = searched(curve, -4.0, 4.0, *targets)
     assert [root.value for (root,) in roots] == close(np.arctanh(targets), abs=1e-6)
     assert curve.calls < 2500
-
-
-def test_turning_points_are_those_beyond_the_error() -> None:
-    noise = np.array([0.0, 0.1, 0.0, 1.0, 0.95, 1.0, 2.0, 0.0, 0.05])
-    assert turning_points(noise, np.full(noise.size, 0.06)) == [(6, 1.0)]
-    assert turning_points(noise, np.full(noise.size, 2.0)) == []
 
 
 def test_neighbouring_doubles_are_found_at_any_scale_and_across_zero() -> None:

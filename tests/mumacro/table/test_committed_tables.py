@@ -17,7 +17,7 @@ from builder.solver.sweep import Sweep
 from builder.tables.contacts import spring
 from builder.tables.draws import SEAMS
 from builder.tables.quantities import ABS_TO_REL, STICK_NOISE, solver_noise
-from builder.tables.rounding import STEPS, to_step
+from builder.tables.rounding import STEPS, round_block
 from builder.tables.verify import holds, monotony, seam_jumps, seam_slope_jumps, verify
 from mumacro import Surrogate, TableError
 from mumacro.inputs.fields import FIELDS
@@ -252,8 +252,9 @@ def test_nodes_are_rounded_to_what_their_block_was_built_for(table: Surrogate) -
     targets = json.loads(table.table.attributes["builder_options"])["block_targets"]
     for contact in table.table.contacts.values():
         for block, target in zip(contact.blocks, targets[contact.name], strict=True):
-            for nodes in block.nodes.values():
-                assert np.array_equal(nodes, to_step(nodes, target))
+            rounded = round_block(block, target)
+            for name, nodes in block.nodes.items():
+                assert np.array_equal(nodes, rounded.nodes[name])
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
