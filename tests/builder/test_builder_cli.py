@@ -150,7 +150,7 @@ def test_solve_answers_at_the_ends_of_its_range(run_builder: Run, here: Run) -> 
     assert answer["stick_fraction"] > 0.99
 
 
-def test_verify_refuses_a_damaged_table(here: Run, tables_dir: Path, tmp_path: Path) -> None:
+def test_verify_names_a_damaged_table(here: Run, tables_dir: Path, tmp_path: Path) -> None:
     cut = Path(shutil.copy(tables_dir / "mumacro-1e-4.nc", tmp_path / "cut.nc"))
     cut.write_bytes(cut.read_bytes()[:60_000])
     refused(here("verify", cut), "cut.nc", "not a readable netCDF-4 table")
@@ -188,7 +188,7 @@ REFUSED: dict[str, tuple[str, ...]] = {
 
 
 @pytest.mark.parametrize("words", REFUSED)
-def test_bad_arguments_are_refused_before_any_work(here: Run, words: str, repository: Path) -> None:
+def test_bad_arguments_are_told_before_any_work(here: Run, words: str, repository: Path) -> None:
     refused(here(*words.split()), *REFUSED[words])
     assert not list(repository.glob("x.nc*"))
 

@@ -273,13 +273,6 @@ def test_a_frequency_of_few_digits_is_taken_as_it_stands(table: Surrogate, kind:
     assert alone.mu_macro == table.evaluate(**rest, f=np.array([frequency])).mu_macro[0]
 
 
-def test_a_whole_number_beyond_double_range_is_refused_beside_arrays(table: Surrogate) -> None:
-    for name in ("mu0", "k", "omega"):
-        with pytest.raises(InputError) as caught:
-            table.evaluate(**{**CASE, name: 10**400, "v0": np.array([0.01, 0.02])})
-        assert caught.value.field == name
-
-
 def test_the_index_of_an_illegal_value_is_that_of_its_case(table: Surrogate) -> None:
     force = np.array([[10.0], [-1.0]])
     for v0, case in (([0.01, 0.02, 0.03], 3), (0.01, 1)):
@@ -303,9 +296,7 @@ def test_every_input_is_named_in_the_signature(table: Surrogate) -> None:
         ({"groups": True}, 'include="groups"'),
     ],
 )
-def test_a_former_name_is_refused_with_the_new_one(
-    table: Surrogate, former: Case, now: str
-) -> None:
+def test_a_former_name_is_told_the_new_one(table: Surrogate, former: Case, now: str) -> None:
     [name] = former
     for ask in (lambda: table.evaluate(**CASE, **former), lambda: table.evaluate(CASE | former)):
         with pytest.raises(InputError, match=re.escape(now)) as caught:
@@ -349,14 +340,14 @@ def test_arrays_by_keyword_and_in_a_mapping_have_the_same_bits(
 OPTIONS: dict[str, list[Any]] = {
     "gradient": ["yes", "", None, 1, [], np.ones(2)],
     "illegal": ["ignore", None, True, np.array(["nan", "raise"])],
-    "include": [3, ["power", 3], "groups,x"],
+    "include": [3, [None], ["power", 3], ["power", "Groups"], "groups,x"],
     "contact": [3, b"ball", np.ones(2), "cylinder"],
     "direction": [None, "down"],
 }
 
 
 @pytest.mark.parametrize(("name", "bad"), [(n, x) for n, xs in OPTIONS.items() for x in xs])
-def test_an_option_is_refused_by_its_name(table: Surrogate, name: str, bad: Any) -> None:
+def test_a_bad_option_is_named(table: Surrogate, name: str, bad: Any) -> None:
     for k in (CASE["k"], np.array([1e6, 2e6])):
         with refused(name):
             table.evaluate(**{**CASE, "k": k, name: bad})
@@ -402,12 +393,6 @@ def test_a_gap_is_no_rigid_contact_and_the_remedy_is_told(table: Surrogate, gap:
     if gap is None:
         with pytest.raises(InputError, match=message):
             table.evaluate(**{**CASE, "k": gap, "v0": series})
-
-
-def test_shapes_that_do_not_broadcast_are_refused(table: Surrogate) -> None:
-    with pytest.raises(InputError, match="shapes broadcast together") as caught:
-        table.evaluate(**{**CASE, "Fz": [1.0, 2.0], "v0": [1.0, 2.0, 3.0]})
-    assert "(2,)" in str(caught.value)
 
 
 # --- single cases without checks ----------------------------------------------------------

@@ -144,7 +144,7 @@ def test_a_gap_in_a_column_of_texts_rejects_its_row_alone(table: Surrogate, dtyp
     assert answer.mu_macro[2] == table.evaluate(**{**CASE, "k": "rigid"}).mu_macro
 
 
-def test_indexes_that_differ_are_refused(table: Surrogate) -> None:
+def test_indexes_that_differ_are_told(table: Surrogate) -> None:
     one, two = pd.Series([0.01, 0.02]), pd.Series([10.0, 10.0], index=[1, 2])
     with pytest.raises(InputError, match="indexed as the other inputs") as caught:
         table.evaluate(**{**CASE, "Fz": two, "v0": one})
@@ -215,7 +215,7 @@ def test_a_dataset_gives_a_dataset(table: Surrogate) -> None:
     assert str(one.source.values) == expected.source
 
 
-def test_coordinates_and_chunks_that_do_not_fit_are_refused(table: Surrogate) -> None:
+def test_coordinates_and_chunks_that_do_not_fit_are_told(table: Surrogate) -> None:
     da = pytest.importorskip("dask.array")
     with pytest.raises(InputError, match="align them first"):
         table.evaluate(**{**CASE, "v0": da.ones(3), "Fz": da.ones(2)})

@@ -62,13 +62,10 @@ def parts(answer: Any) -> tuple[Any, ...]:
 
 @pytest.mark.parametrize("method", PLANE)
 @pytest.mark.parametrize("bad", NO_NUMBERS)
-def test_a_value_that_is_not_a_number_is_refused_by_name(
-    table: Surrogate, method: str, bad: str
-) -> None:
+def test_a_value_that_is_not_a_number_is_named(table: Surrogate, method: str, bad: str) -> None:
     for v, y, field in ((NO_NUMBERS[bad], 0.5, "v_tilde"), (0.1, NO_NUMBERS[bad], "y_tilde")):
-        with pytest.raises(InputError) as caught:
+        with refused(field) as caught:
             PLANE[method](table, v, y)
-        assert caught.value.field == field
         assert len(str(caught.value)) < 400
     with pytest.raises(InputError):
         table.v_tilde_crit(NO_NUMBERS[bad])
@@ -76,14 +73,13 @@ def test_a_value_that_is_not_a_number_is_refused_by_name(
 
 @pytest.mark.parametrize("method", PLANE)
 @pytest.mark.parametrize("bad", OUT_OF_BOUNDS, ids=repr)
-def test_a_scalar_out_of_bounds_is_refused_and_in_an_array_nan(
+def test_a_scalar_out_of_bounds_is_named_and_in_an_array_nan(
     table: Surrogate, method: str, bad: Any
 ) -> None:
     ask = PLANE[method]
     for v, y, field in ((bad, 0.5, "v_tilde"), (0.1, bad, "y_tilde")):
-        with pytest.raises(InputError) as caught:
+        with refused(field):
             ask(table, v, y)
-        assert caught.value.field == field
         many = ask(table, np.array([0.1, float(v), 0.1]), np.array([0.5, float(y), 0.5]))
         for one, column in zip(parts(ask(table, 0.1, 0.5)), parts(many), strict=True):
             assert column[0] == column[2] == one
@@ -164,7 +160,7 @@ def test_the_callers_floating_point_settings_are_unchanged(table: Surrogate) -> 
 
 
 @pytest.mark.parametrize("method", PLANE)
-def test_shapes_that_do_not_broadcast_are_refused(table: Surrogate, method: str) -> None:
+def test_shapes_that_do_not_broadcast_are_told(table: Surrogate, method: str) -> None:
     with refused("y_tilde"):
         PLANE[method](table, np.ones(3), np.ones(2))
 
@@ -178,14 +174,13 @@ def test_of_must_be_a_quantity(table: Surrogate) -> None:
 
 @pytest.mark.parametrize("bad", [bad for bad in NO_NUMBERS if bad != "None"])
 @pytest.mark.parametrize("field", ["mu0", "k", "omega", "f", "v0"])
-def test_evaluate_refuses_a_value_that_is_not_a_number_by_name(
+def test_evaluate_names_a_value_that_is_not_a_number(
     table: Surrogate, field: str, bad: str
 ) -> None:
     case = {**without(CASE, "omega" if field == "f" else field), field: NO_NUMBERS[bad]}
     for request in ({}, {"gradient": True}, {"illegal": "raise"}):
-        with pytest.raises(InputError) as caught:
+        with refused(field):
             table.evaluate(**case, **request)
-        assert caught.value.field == field
     with pytest.raises(InputError):
         table.evaluate(case)
 

@@ -262,7 +262,7 @@ def test_a_table_replaced_after_it_was_opened_is_pickled_as_it_was_opened(tmp_pa
     assert again.checksum == opened.checksum
 
 
-def test_a_bundled_table_of_another_release_is_refused() -> None:
+def test_a_bundled_table_of_another_release_is_told() -> None:
     opened = Surrogate.open(1e-4)
     data = pickle.dumps(opened).replace(opened.checksum.encode(), b"0" * 64)
     with pytest.raises(TableError, match="install the same release on both sides"):

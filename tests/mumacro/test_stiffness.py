@@ -159,9 +159,8 @@ def test_stiffness_has_its_scaling_laws_and_adds_in_series() -> None:
     ],
 )
 def test_a_bad_value_is_named(field: str, function: Any, arguments: Any) -> None:
-    with pytest.raises(InputError) as caught:
+    with refused(field):
         function(*arguments)
-    assert caught.value.field == field
 
 
 def test_hertz_wants_a_small_contact() -> None:
@@ -255,7 +254,7 @@ def test_a_bad_argument_is_named_with_the_remedy(
 
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)
-def test_numbers_of_any_size_are_refused_or_give_a_contact(geometry: str) -> None:
+def test_numbers_of_any_size_give_a_contact_or_a_reason(geometry: str) -> None:
     sizes = [5e-324, stiffness.SMALLEST, 1.0, stiffness.LARGEST, 1.7e308]
     names = [name for name in GEOMETRIES[geometry].arguments if name != "oscillation"]
     rest: Case = {"nu": 0.3, "E2": math.inf, "nu2": 0.5} | (

@@ -236,6 +236,6 @@ def test_a_bundled_table_is_read_once() -> None:
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1.0, True, "2", 100_000])
-def test_threads_out_of_bounds_are_refused(fine: Surrogate, threads: Any) -> None:
+def test_threads_have_bounds(fine: Surrogate, threads: Any) -> None:
     with refused("threads"):
         Surrogate.open(fine.path, threads=threads)

@@ -111,7 +111,7 @@ def test_a_build_that_cannot_be_made_says_so_in_one_line(repository: Path, tmp_p
         assert not list(tmp_path.iterdir())
 
 
-def test_a_platform_without_a_wheel_is_refused_by_name(repository: Path) -> None:
+def test_a_platform_without_a_wheel_is_named(repository: Path) -> None:
     command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel"]
     env = {**os.environ, "MUMACRO_BUILD_PLATFORM": "amiga"}
     done = subprocess.run(

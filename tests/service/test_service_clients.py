@@ -70,7 +70,7 @@ def test_limits_hold_for_a_request_to_upgrade(live_server: Any, body: bytes) -> 
             assert status in to_end(raw)[:20]
 
 
-def test_a_head_of_http_2_without_its_framing_is_refused(live_server: Any) -> None:
+def test_a_head_of_http_2_without_its_framing_is_bad(live_server: Any) -> None:
     for text in (b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", b"GET /livez HTTP/2.0\r\nHost: x\r\n\r\n"):
         with connect(live_server) as raw:
             raw.sendall(text)

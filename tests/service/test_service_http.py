@@ -71,20 +71,10 @@ KEY = {"X-API-Key": "s3cret-key"}
 @pytest.mark.parametrize(
     "path",
     [
-        "/nowhere",
-        "/static/page/",
-        "/v1",
-        "/v1/mu-macro/",
-        "/v2/mu-macro",
-        "/static/../settings.py",
-        "/%00",
+        *("/nowhere", "/v1", "/v1/mu-macro/", "/v2/mu-macro", "/v1/mu_macro", "/V1/Law"),
+        *("/readyz/", "/static/page/", "/static/../settings.py", "/%00"),
     ],
 )
-def test_an_unknown_path_is_not_found(client: Any, problem: Any, path: Any) -> None:
-    problem(client.get(path), 404)
-
-
-@pytest.mark.parametrize("path", ["/v1/mu_macro", "/V1/Law", "/readyz/", "/nowhere"])
 def test_an_unknown_path_is_told_where_all_are(client: Any, problem: Any, path: str) -> None:
     detail = problem(client.get(path), 404)["detail"]
     assert detail == "no such path; /docs describes all of them"
@@ -274,7 +264,7 @@ def test_what_fails_at_the_start_is_told_as_it_is(started: Any) -> None:
         pass
 
 
-def test_a_direct_route_refuses_a_dependency_that_it_would_not_solve() -> None:
+def test_a_direct_route_has_no_dependency_that_it_would_not_solve() -> None:
     router = APIRouter(route_class=DirectRoute)
 
     async def answer(request: Request, case: CaseRequest) -> None: ...
@@ -291,7 +281,7 @@ def test_the_key_gives_access(closed: Any, case: Case, headers: Any) -> None:
     assert response.headers["vary"] == "X-API-Key, Authorization"
 
 
-def test_a_key_given_twice_is_refused_and_blanks_around_one_are_not(
+def test_a_key_is_given_once_and_may_have_blanks_around_it(
     closed: Any, case: Case, problem: Any
 ) -> None:
     for name, value in (("X-API-Key", "s3cret-key"), ("Authorization", "Bearer s3cret-key")):
@@ -339,7 +329,7 @@ def test_time_to_refuse_grows_no_faster_than_the_body(
         assert seconds(long) / seconds(short) < 64.0, short[:300]
 
 
-def test_a_large_body_is_refused_with_and_without_a_length(
+def test_a_body_has_a_limit_with_and_without_a_length(
     started: Any, case: Case, problem: Any
 ) -> None:
     body = json.dumps(case).encode()
@@ -440,7 +430,7 @@ def test_the_description_has_the_alternatives(
     assert allowed == {True, False}
 
 
-def test_no_default_of_the_description_is_refused(client: Any) -> None:
+def test_every_default_of_the_description_may_be_sent(client: Any) -> None:
     """A client that sends every default must be answered: null in k never is."""
     schemas = client.get("/openapi.json").json()["components"]["schemas"]
     for name in ("Case", "CaseRequest", "CaseColumns", "LawRequest", "MotionRequest"):

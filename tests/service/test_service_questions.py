@@ -99,6 +99,7 @@ def test_targets_keep_their_order_and_unreachable_ones_have_a_reason(client: Any
         {"unknown": "k", "y0": 2e-6, "v0": 1e-4, "target": 0.3 * 0.0023, "k": ...},  # three roots
         {"unknown": "Fz", "y0": 2e-6, "target": 0.2, "contact": "ball"},
         {"unknown": "v0", "v0": ..., "y0": 0.0},
+        {"unknown": "Fz", "y0": 2e-6, "target": 0.25, "stiffness_exponent": 0.5},
     ],
 )
 def test_a_solution_is_the_librarys(client: Any, surrogate: Surrogate, case: Any) -> None:
@@ -122,6 +123,7 @@ def test_a_solution_is_the_librarys(client: Any, surrogate: Surrogate, case: Any
         {"along": "Fz", "v0": 0.01, "start": 1.0, "stop": 20.0, "contact": "ball"},
         {"along": "f", "v0": 0.01, "start": 1.0, "stop": 1e5, "omega": ..., "scale": "linear"},
         {"points": 33.0},  # an integer may be written so
+        {"along": "Fz", "v0": 0.01, "start": 1.0, "stop": 100.0, "stiffness_exponent": 0.5},
         {"k": "0.8..1.2 N/um"},
         {"k": "1 ± 0.1 N/um", "mu0": "0.3 ± 0.02"},
     ],

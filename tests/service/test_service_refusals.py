@@ -161,6 +161,15 @@ REFUSED = [
         for names in ("curvature", "power,approximations")
     ),
     *((f"{call}", {"include": ["model"]}, "#/include") for call in ("POST law", "POST solve-for")),
+    *(
+        ("POST law", {"along": "Fz", "v0": 0.01, "start": 1.0, "stop": 9.0, **change}, f"#/{place}")
+        for change, place in (
+            ({}, "Fz"),
+            ({"Fz": ..., "stiffness_exponent": 0.5}, "Fz"),
+            ({"stiffness_exponent": 1.5}, "stiffness_exponent"),
+        )
+    ),
+    ("POST law", {"stiffness_exponent": 0.5}, "#/stiffness_exponent"),
     ("GET law.csv?mu0=0.4", {}, "?mu0"),
     ("GET law.csv", {"omega": ...}, "?omega"),
     ("GET law.csv", {"Fz": "ten"}, "?Fz"),

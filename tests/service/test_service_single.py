@@ -115,35 +115,6 @@ def test_one_value_is_returned_as_text_and_answers_may_be_cached(client: Any, ca
     assert get.headers["cache-control"] == plain.headers["cache-control"] == "public, max-age=3600"
 
 
-@pytest.mark.parametrize(
-    ("change", "limits", "power"),
-    [
-        *(
-            ({name: 0, **rest}, (0.3, 0.0, 0.3), 0.0)
-            for name in ("y0", "omega")
-            for rest in ({}, {"k": "rigid"})
-        ),
-        ({"k": "rigid"}, (0.0, 0.0, 0.0), None),
-    ],
-)
-def test_nothing_sticks_without_oscillation_or_k(
-    client: Any, case: Case, change: Any, limits: Any, power: Any
-) -> None:
-    answer = ask(client, {**case, **change}, include=["limits", "power", "stick_fraction"])
-    assert tuple(answer["limits"].values()) == limits
-    assert (answer["mu_macro"] == 0.3) == (limits[0] == 0.3)
-    assert answer["power"]["oscillation"] == answer["power_bound"]["oscillation"] == power
-    assert answer["power"]["saved"] == close(
-        (0.3 - answer["mu_macro"]) * case["Fz"] * case["v0"], abs=1e-300
-    )
-    assert answer["stick_fraction"] == answer["stick_fraction_bound"] == 0.0
-    assert (
-        0.0
-        <= answer["power_bound"]["saved"]
-        <= 2.0 * answer["error_bound"] * case["Fz"] * case["v0"] + 1e-15
-    )
-
-
 def test_one_name_stands_in_place_of_a_list_of_one(client: Any, case: Case) -> None:
     for name in ("power", "inputs"):
         assert ask(client, case, include=name) == ask(client, case, include=[name])

@@ -225,7 +225,9 @@ def test_no_compiler_warns(
     ["-ffast-math", "-funsafe-math-optimizations", "-ffinite-math-only", "-D_M_FP_FAST"],
 )
 @pytest.mark.parametrize("name", ["gcc", "clang"])
-def test_arithmetic_that_breaks_bounds_is_refused(folder: Path, name: str, option: Any) -> None:
+def test_arithmetic_that_breaks_bounds_does_not_compile(
+    folder: Path, name: str, option: Any
+) -> None:
     command = [*compilers.compiler(name), "-std=c99", "-O1", option, "-fsyntax-only"]
     macros = [*compilers.compiler(name), "-O1", "-dM", "-E", "-x", "c", os.devnull]
     if compilers.run(*macros) == compilers.run(*macros, option):
@@ -391,7 +393,7 @@ def test_cases_of_every_contact_and_direction_are_the_librarys(
         assert same(ask(best.case_arrays, x.shape[1], 2, x).reshape(2, -1), expected[:3:2])
 
 
-def test_a_contact_or_direction_that_is_not_there_is_refused(best: Any) -> None:
+def test_a_contact_or_direction_that_is_not_there_has_no_answer(best: Any) -> None:
     best.mumacro_error_text.restype = ctypes.c_char_p
     for kind, error, about in (
         ((1, 2), -4, b"radius"),

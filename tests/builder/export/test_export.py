@@ -126,7 +126,7 @@ def test_what_the_command_cannot_export_is_reported_in_one_line(
     assert [path.name for path in tmp_path.iterdir()] == ["pyproject.toml"]
 
 
-def test_what_cannot_be_exported_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
+def test_what_cannot_be_exported_is_told_and_leaves_nothing(tmp_path: Path) -> None:
     copy, folder = Path(shutil.copy(PATH, tmp_path / "table.nc")), tmp_path / "folder.h"
     folder.mkdir()
     for path, kind, out, error, words in (

@@ -265,7 +265,7 @@ def test_states_are_kept_and_illegal_inputs_discarded(
     assert model.get("k", "v_rest") == [1e6, 1e-4]
 
 
-def test_another_units_token_is_refused(unit: Path, fmpy: Any, tmp_path: Path) -> None:
+def test_another_units_token_is_told(unit: Path, fmpy: Any, tmp_path: Path) -> None:
     description = fmpy.read_model_description(str(unit))
     folder = fmpy.extract(str(unit), str(tmp_path))
     description.guid = description.instantiationToken = "another"

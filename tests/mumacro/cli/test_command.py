@@ -29,6 +29,8 @@ CASE = "mu0=0.3 Fz=10 k=1e6 y0=2e-6 f=20690 v0=0.01"
 SWEPT = ("law", CASE.replace("v0=0.01", ""), "--along", "v0")
 NORMAL = CASE.replace("y0=2e-6", "Fz_amplitude=1N")
 ALONG_NORMAL = ("--direction", "normal")
+SHAKEN = ("motion", CASE.replace("y0=2e-6 ", ""))
+OVER_LOADS, NO_LOAD = ("law", "--along", "Fz", "0.1kN", "1kN"), CASE.replace("Fz=10 ", "")
 VALUES: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "omega": math.tau * 20690, "v0": 0.01}
 
 
@@ -158,6 +160,24 @@ FAULTS: list[tuple[str | tuple[str, ...], str]] = [
     (("solve-for", "y0", CASE), 'missing: --target, as in mumacro solve-for y0 "'),
     (("solve-for", "y0", CASE, "--target", "half"), "got 'half': give mu_macro, such as 0.15"),
     (("solve-for", "y0", CASE, "--target", "1..2"), "target must be one number"),
+    ((*OVER_LOADS, CASE), "Fz must be left out"),
+    ((*OVER_LOADS, NO_LOAD, "--stiffness-exponent", "0.5"), "the load at which k holds"),
+    ((*OVER_LOADS, CASE, "--stiffness-exponent", "2"), "one number from 0 to 1"),
+    ((*SWEPT, "1", "2", "--stiffness-exponent", "0.5"), "left out where v0 is"),
+    # motions
+    ((*SHAKEN, "--y", "2N"), "y, amplitude"),
+    ((*SHAKEN, "--y", "2um@90N"), "y, phase"),
+    ((*SHAKEN, "--y", "2um@"), "2um@90deg"),
+    ((*SHAKEN, "--y", "1.5:2um"), "whole number"),
+    ((*SHAKEN, "--y", "a:2um"), "y, harmonic"),
+    ((*SHAKEN, "--normal", "2um"), "normal, amplitude"),
+    ((*SHAKEN, "--normal", "10N"), "lifts off"),
+    ((*SHAKEN, "--normal", "1N", "--contact", "ball"), "contact radius"),
+    (("motion", CASE), "--y"),
+    (("motion", SHAKEN[1].replace("1e6", "0.9..1.1N/um"), "--y", "2um"), "one k"),
+    (("motion", SHAKEN[1].replace("1e6", "rigid"), "--y", "2um"), "rigid"),
+    (("motion", "mu0=0.3 Fz=10N", "--y", "2um"), "missing: k"),
+    # stiffnesses
     (("stiffness",), "missing: GEOMETRY, as in mumacro stiffness ball"),
 ]
 

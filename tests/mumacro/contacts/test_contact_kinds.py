@@ -160,9 +160,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("changed", "place"), REFUSED)
-def test_what_does_not_belong_is_refused_by_name(
-    table: Surrogate, changed: Any, place: str
-) -> None:
+def test_what_does_not_belong_is_named(table: Surrogate, changed: Any, place: str) -> None:
     inputs = {**CASE, **changed}
     absent = [name for name in ("k", "y0") if inputs[name] is None]
     with refused(place):

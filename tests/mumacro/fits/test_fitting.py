@@ -204,14 +204,13 @@ def test_a_fit_predicts_at_other_inputs_by_name(surrogate: Surrogate) -> None:
         ({"f": 1e4}, "v0"),
     ],
 )
-def test_predictions_that_would_be_misread_are_refused(
+def test_predictions_that_would_be_misread_name_their_input(
     surrogate: Surrogate, inputs: Any, field: str
 ) -> None:
     mu0 = np.linspace(0.35, 0.25, V0.size)
     found = fit({"v0": V0, "mu0": mu0, "mu_macro": friction(surrogate, v0=V0, mu0=mu0)}, **RIG)
-    with pytest.raises(InputError) as caught:
+    with refused(field):
         found.predict(**({"mu0": 0.3} if field != "mu0" else {}), **inputs)
-    assert caught.value.field == field
 
 
 def test_a_fit_reads_texts_and_units_like_every_answer(surrogate: Surrogate) -> None:
@@ -513,14 +512,14 @@ def test_bad_input_is_named_with_the_remedy(data: Any, inputs: Any, message: Any
 
 
 @pytest.mark.parametrize("amplitude", [-1.0, 10.0, 20.0])
-def test_an_amplitude_that_lifts_the_contact_off_is_refused(amplitude: float) -> None:
+def test_an_amplitude_that_lifts_the_contact_off_is_named(amplitude: float) -> None:
     rig: dict[str, Any] = {"Fz": 10.0, "f": 20e3, "Fz_amplitude": amplitude}
     with refused("Fz_amplitude") as caught:
         fit({"v0": [0.01, 0.02, 0.03], "mu_macro": [0.2, 0.22, 0.24]}, direction="normal", **rig)
     assert (caught.value.field, caught.value.value) == ("Fz_amplitude", amplitude)
 
 
-def test_points_that_do_not_depend_on_k_are_refused() -> None:
+def test_points_that_do_not_depend_on_k_are_no_data() -> None:
     data = {"v0": [0.0, 0.1], "y0": [2e-6, 0.0], "mu_macro": [0.0, 0.3]}
     with refused("data"):
         fit({**data, "y0": [0.0, 1e-15], "v0": [0.1, 1e6], "mu_macro": [0.3, 0.3]}, Fz=10.0, f=2e4)
@@ -534,7 +533,7 @@ def test_points_that_do_not_depend_on_k_are_refused() -> None:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_extreme_points_are_refused_or_give_no_nan(seed: int) -> None:
+def test_extreme_points_give_a_reason_or_no_nan(seed: int) -> None:
     """One number of an ordinary measurement is replaced by one of any size."""
     chance = np.random.default_rng(seed)
     sizes = [0.0, 5e-324, 1.7e308, 1e20, *10.0 ** chance.uniform(-307, 308, 3)]
@@ -584,7 +583,7 @@ def test_a_fit_has_the_least_chi2(surrogate: Surrogate) -> None:
     assert tried > 40
 
 
-def test_more_points_than_a_fit_takes_are_refused_with_the_remedy(surrogate: Surrogate) -> None:
+def test_more_points_than_a_fit_takes_are_told_the_remedy(surrogate: Surrogate) -> None:
     v0 = np.geomspace(1e-3, 1.0, 10_001)
     with refused("data") as caught:
         fit({"v0": v0, "mu_macro": np.full(v0.size, 0.2)}, **RIG, surrogate=surrogate)

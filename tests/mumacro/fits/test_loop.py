@@ -259,7 +259,7 @@ def test_what_speaks_against_the_model_is_noted() -> None:
         ({"displacement": np.zeros(60_000)}, "displacement"),
     ],
 )
-def test_what_is_no_loop_is_refused_by_name(change: dict[str, Any], field: str) -> None:
+def test_what_is_no_loop_names_its_column(change: dict[str, Any], field: str) -> None:
     x = sine(100, 2.0)
     with refused(field):
         fit_loop(**{"displacement": x, "force": forces("spring", x), "Fz": FZ, **change})

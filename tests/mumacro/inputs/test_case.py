@@ -19,6 +19,7 @@ from mumacro.inputs.numbers import read_number
 from mumacro.inputs.units import QUANTITIES, Unit, canonical, parse_unit
 from mumacro.motions.oscillation import read_oscillation
 from tests.support.comparing import close
+from tests.support.refusals import refused
 
 TYPED = {
     ("y0", "2um"): 2e-6,
@@ -152,10 +153,9 @@ REFUSED = {
 
 @pytest.mark.parametrize(("name", "text"), [(n, t) for n, ts in REFUSED.items() for t in ts])
 def test_what_is_not_understood_names_its_input_and_what_was_given(name: str, text: str) -> None:
-    with pytest.raises(InputError) as refused:
+    with refused(name) as caught:
         read(name, text)
-    assert refused.value.field == name
-    assert refused.value.value == text
+    assert caught.value.value == text
 
 
 _SAYS = ("give", "as", "mean", "be")  # before it
@@ -236,9 +236,8 @@ def test_numbers_of_any_type_are_numbers(value: Any) -> None:
     ],
 )
 def test_what_is_no_number_names_its_input(value: Any) -> None:
-    with pytest.raises(InputError) as refused:
+    with refused("y0"):
         read("y0", value)
-    assert refused.value.field == "y0"
 
 
 def test_every_input_has_an_example_that_is_usual() -> None:

@@ -124,9 +124,8 @@ BAD: dict[str, tuple[Any, str]] = {
 @pytest.mark.parametrize("kind", BAD)
 def test_what_is_no_column_of_numbers_has_one_fault_with_its_name(kind: str) -> None:
     values, words = BAD[kind]
-    with pytest.raises(InputError) as refusal:
+    with refused("y0") as refusal:
         read_column("y0", values)
-    assert refusal.value.field == "y0"
     assert words in str(refusal.value)
     assert len(str(refusal.value)) < 400
 

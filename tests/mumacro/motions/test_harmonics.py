@@ -112,12 +112,11 @@ def test_a_symmetric_oscillation_that_begins_as_it_ends_keeps_all_its_samples() 
         ([0.0, 1.0, 0.5, -1.0] * 10, {"periods": True}, "periods", ">= 1"),
     ],
 )
-def test_what_are_no_samples_of_whole_periods_is_refused(
+def test_what_are_no_samples_of_whole_periods_is_told(
     samples: Any, options: dict[str, Any], field: str, text: str
 ) -> None:
-    with pytest.raises(InputError) as caught:
+    with refused(field) as caught:
         harmonics(samples, **options)
-    assert caught.value.field == field
     assert text in str(caught.value)
 
 
@@ -136,7 +135,7 @@ def test_samples_at_the_ends_of_double_range_are_numbers_like_others() -> None:
 
 
 @pytest.mark.parametrize("name", ["x", "y", "normal"])
-def test_samples_that_are_given_as_amplitudes_are_refused_with_the_way_to_harmonics(
+def test_samples_that_are_given_as_amplitudes_are_told_the_way_to_harmonics(
     name: str,
 ) -> None:
     samples = sampled([(1, 2e-6, 0.0)], 8)

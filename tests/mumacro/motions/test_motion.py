@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mumacro import Element, InputError, Motion, Surrogate, motion, solve_motion
+from mumacro import Element, Motion, Surrogate, motion, solve_motion
 from mumacro.cli.main import main
 from mumacro.cli.motion import EXAMPLE
 from mumacro.kernel.binding import Kernel
@@ -223,13 +223,12 @@ def test_the_estimate_covers_and_the_tolerance_holds(
 
 
 @pytest.mark.parametrize("v", [1e-12, 1e-11, 1e-10, 1e-9])
-def test_a_ball_that_is_hardly_dragged_has_an_answer_or_a_refusal(v: float) -> None:
+def test_a_ball_that_is_hardly_dragged_has_an_answer_or_a_reason(v: float) -> None:
     """It took minutes and gave up, at some motions already at 1e-6."""
     one: dict[str, Any] = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "contact": "ball"}
     if v < SLOWEST:
-        with pytest.raises(InputError) as refusal:
+        with refused("v0"):
             motion(**one, v0=v, x=(0.3, 40.0), y=0.9)
-        assert refusal.value.field == "v0"
     else:
         answer = motion(**one, v0=v, x=(0.3, 40.0), y=0.9)
         assert answer.error_estimate <= 1e-6
@@ -616,6 +615,7 @@ WRONG: tuple[tuple[dict[str, Any], str, str], ...] = (
     ({"y": "0.5 um with 90 degrees"}, "y", "did you mean 0.5um@90degrees?"),
     ({"y": "2e-6,90"}, "y", "did you mean 2e-6@90deg?"),
     ({"y": None}, "y, amplitude", "real number"),
+    *(({name: (1e-6,) * n}, name, "a pair") for name in ("x", "y", "normal") for n in (1, 3, 4)),
     ({"normal": 3.0, "contact": "ball"}, "normal", "contact radius"),
     ({"contact": "cube"}, "contact", "spring, ball"),
     ({"omega": 1e5}, "omega", "exactly one"),
@@ -628,12 +628,9 @@ WRONG: tuple[tuple[dict[str, Any], str, str], ...] = (
 
 
 @pytest.mark.parametrize(("change", "name", "text"), [*BAD, *WRONG])
-def test_what_has_no_answer_is_refused_with_advice(
-    change: dict[str, Any], name: str, text: str
-) -> None:
-    with pytest.raises(InputError) as caught:
+def test_what_has_no_answer_gets_advice(change: dict[str, Any], name: str, text: str) -> None:
+    with refused(name) as caught:
         motion(**{**SCENE, "y": 2e-6, **change})
-    assert caught.value.field == name
     assert text in str(caught.value)
 
 
@@ -709,31 +706,6 @@ def test_the_command_has_the_librarys_answer(capsys: Capture) -> None:
     assert "numerical error" in text
     ball = json.loads(output_of(capsys, 0, COMMAND, "--y", "2um", "--contact", "ball", "--json"))
     assert ball["mu_macro"] == motion(**SCENE, y=2e-6, contact="ball").mu_macro
-
-
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [
-        ((COMMAND, "--y", "2N"), "y, amplitude"),
-        ((COMMAND, "--y", "2um@90N"), "y, phase"),
-        ((COMMAND, "--y", "2um@"), "2um@90deg"),
-        ((COMMAND, "--y", "1.5:2um"), "whole number"),
-        ((COMMAND, "--y", "a:2um"), "y, harmonic"),
-        ((COMMAND, "--normal", "2um"), "normal, amplitude"),
-        ((COMMAND, "--normal", "10N"), "lifts off"),
-        ((COMMAND, "--normal", "1N", "--contact", "ball"), "contact radius"),
-        ((f"{COMMAND} y0=2um",), "--y"),
-        ((COMMAND.replace("1N/um", "0.9..1.1N/um"), "--y", "2um"), "one k"),
-        ((COMMAND.replace("1N/um", "rigid"), "--y", "2um"), "rigid"),
-        (("mu0=0.3 Fz=10N", "--y", "2um"), "missing: k"),
-    ],
-)
-def test_the_command_refuses_in_one_line(
-    capsys: Capture, words: tuple[str, ...], text: str
-) -> None:
-    line = output_of(capsys, 2, *words)
-    assert text in line
-    assert len(line.splitlines()) == 1
 
 
 def test_the_command_writes_pictures_and_csv(capsys: Capture, tmp_path: Any) -> None:
@@ -855,16 +827,6 @@ def test_no_motion_at_all_is_told() -> None:
     assert remark["text"] == "x = y = normal = 0: the contact is not shaken, mu_macro is mu0"
     assert motion(**RIG, normal=1.0).remarks == []
     assert motion(**RIG, x=np.array([0.0, 1e-6, 0.0])).remarks[0]["cases"] == 2
-
-
-@pytest.mark.parametrize("name", ["x", "y", "normal"])
-@pytest.mark.parametrize("part", [(1e-6, 90.0, 2.0), (1e-6,), (1e-6, 1e-6, 1e-6, 1e-6)])
-def test_a_tuple_that_is_no_pair_is_refused_by_name(name: str, part: Any) -> None:
-    with refused(name):
-        motion(**RIG, **{name: part})
-    without_v0 = {one: x for one, x in RIG.items() if one != "v0"}
-    with refused(name):
-        solve_motion("v0", target=0.1, **without_v0, **{"x": 1e-6, name: part})
 
 
 def test_a_tuple_of_triples_is_a_list_of_them() -> None:

@@ -92,7 +92,7 @@ def test_stored_border_in_scalars_arrays_and_shapes(table: Surrogate) -> None:
 
 
 @pytest.mark.parametrize("bad", [-1.0, -1e-300, math.nan, -math.inf])
-def test_stored_border_refuses_illegal_amplitudes(table: Surrogate, bad: float) -> None:
+def test_stored_border_names_illegal_amplitudes(table: Surrogate, bad: float) -> None:
     with refused("y_tilde") as caught:
         table.v_tilde_crit(bad)
     assert caught.value.index is None
