@@ -232,6 +232,8 @@ def test_a_deviation_implies_std_to_first_order_with_shares(table: Surrogate, k:
         for name, x in STD.items()
     }
     assert answer["std"] == close(math.hypot(*parts.values()), rel=1e-12)
+    bounds = (answer.gradient_bound[name] * x for name, x in STD.items())
+    assert answer["std_bound"] == close(math.hypot(*bounds), rel=1e-12)
     for name, part in parts.items():
         assert answer[f"std_share.{name}"] == close((part / answer["std"]) ** 2, rel=1e-12)
     assert math.fsum(answer["std_share"].values()) == close(1.0, rel=1e-12)

@@ -155,6 +155,7 @@ def test_cases_stand_on_the_map_of_their_kind_though_no_groups_were_asked_for(
     (border,) = [line for line in axes.lines if "border" in line.get_label()]
     v, y = border.get_data()
     np.testing.assert_array_equal(v, surrogate.v_tilde_crit(y, **kind.names))
+    assert not kind.normal or y[-1] == close(0.999, rel=1e-9)  # where the contact lifts off
     words = {"across": "amplitude across", "along": "amplitude along", "normal": "of the load"}
     assert words[kind.names["direction"]] in axes.get_ylabel()
     assert (r"\hat F_z / F_z" in axes.get_ylabel()) == kind.normal

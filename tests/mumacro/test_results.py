@@ -4,6 +4,7 @@ JSON, a frame of pandas."""
 import inspect
 import json
 import re
+import sys
 from collections.abc import Callable
 from html.parser import HTMLParser
 from typing import Any
@@ -108,6 +109,8 @@ def test_a_result_fits_16_lines_and_other_forms_hold_all_of_it(
     frame = result.to_frame()
     assert isinstance(frame, pandas.DataFrame)
     assert len(frame) >= n or name.startswith("solution")
+    for path in getattr(result, "paths", ()):
+        np.testing.assert_array_equal(frame[path].to_numpy(), np.ravel(result[path]))
     # what json writes by itself is strict JSON: no NaN
     json.loads(json.dumps(result.to_dict(), allow_nan=False))
 
@@ -136,6 +139,14 @@ def well_formed(text: str) -> bool:
 
     Tags().feed(text)
     return not open_tags
+
+
+def test_without_pandas_a_frame_names_it(
+    surrogate: Surrogate, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(mumacro.MumacroError, match="pip install pandas"):
+        surrogate.evaluate(**CASE).to_frame()
 
 
 # --- one case: what the command prints ------------------------------------------------------------

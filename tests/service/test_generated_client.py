@@ -3,7 +3,6 @@ answers."""
 
 import importlib.util
 import json
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import pytest
 from mumacro import Surrogate
 from tests.support.cases import Case
 from tests.support.comparing import close
+from tests.support.compilers import run
 
 pytestmark = [
     pytest.mark.peer,
@@ -68,20 +68,6 @@ print(json.dumps([
 """
 
 
-def run(folder: Path, *arguments: str) -> str:
-    """Python with these arguments in the folder; what it prints."""
-    done = subprocess.run(
-        [sys.executable, *arguments],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
-
-
 @pytest.fixture(scope="module")
 def folder(live_server: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The client, and a program that uses it."""
@@ -92,13 +78,20 @@ def folder(live_server: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     (folder_of_client / "program.py").write_text(PROGRAM)
     options = "--meta none --config config.yaml --path openapi.json --output-path mumacro_client"
-    run(folder_of_client, "-m", "openapi_python_client", "generate", *options.split())
+    run(
+        sys.executable,
+        "-m",
+        "openapi_python_client",
+        "generate",
+        *options.split(),
+        cwd=folder_of_client,
+    )
     return folder_of_client
 
 
 def test_it_is_typed(folder: Path) -> None:
     options = "--strict --follow-imports silent --cache-dir cache program.py"
-    run(folder, "-m", "mypy", *options.split())
+    run(sys.executable, "-m", "mypy", *options.split(), cwd=folder)
 
 
 def test_its_answers_are_those_of_the_library(
@@ -109,6 +102,6 @@ def test_its_answers_are_those_of_the_library(
     mu, regime = elastic.mu_macro, elastic.regime
     rigid = surrogate.evaluate(**{**case, "k": "rigid"}, v0=0.01).mu_macro
     rest = surrogate.evaluate(**case, v0=0.0).mu_macro
-    *answers, v0 = json.loads(run(folder, "program.py", live_server.url))
+    *answers, v0 = json.loads(run(sys.executable, "program.py", live_server.url, cwd=folder))
     assert answers == [mu, (0.3 - mu) * 10.0 * 0.01, regime, rigid, "mu0", [rest, mu], rigid]
     assert v0 == close(0.01, rel=1e-9)

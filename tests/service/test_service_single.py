@@ -1,5 +1,5 @@
-"""One case over HTTP: its answer, and all that ``include`` adds to it; the other forms are those of
-test_formats.py."""
+"""One case over HTTP: its answer, and all that ``include`` adds to it; all forms are in
+test_service_contacts.py."""
 
 import asyncio
 import json

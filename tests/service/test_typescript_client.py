@@ -4,7 +4,6 @@ bodies of the documents compile, faults in them do not, and the answers are the 
 import json
 import re
 import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import pytest
 from mumacro import Surrogate
 from tests.support.cases import Case
 from tests.support.comparing import close
+from tests.support.compilers import run
 from tests.support.places import ROOT
 
 GENERATOR = shutil.which("openapi-typescript")
@@ -86,15 +86,6 @@ def bodies(described: dict[str, Any]) -> list[tuple[str, str]]:
     return found
 
 
-def run(folder: Path, *command: str) -> str:
-    """A command in the folder; what it prints."""
-    done = subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, timeout=300, check=False
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
-
-
 def test_a_strict_client_compiles_with_the_documented_bodies_and_is_answered(
     live_server: Any, tmp_path: Path, surrogate: Surrogate
 ) -> None:
@@ -110,15 +101,15 @@ def test_a_strict_client_compiles_with_the_documented_bodies_and_is_answered(
         f'export const body{i}: Body<"{path}"> = {body};' for i, (path, body) in enumerate(written)
     )
     (tmp_path / "program.ts").write_text(PROGRAM % (constants + FAULTS))
-    run(tmp_path, str(GENERATOR), "openapi.json", "-o", "schema.d.ts")
+    run(str(GENERATOR), "openapi.json", "-o", "schema.d.ts", cwd=tmp_path)
     options = (
         "--strict --exactOptionalPropertyTypes false --noUncheckedIndexedAccess --target es2022"
     )
     options += " --module nodenext --lib es2022,dom,dom.iterable --allowImportingTsExtensions"
     options += " --rewriteRelativeImportExtensions --outDir built program.ts"
-    run(tmp_path, "tsc", *options.split())
+    run("tsc", *options.split(), cwd=tmp_path)
     mu, saved, k, rigid, field, columns, rows = json.loads(
-        run(tmp_path, "node", "built/program.js", live_server.url)
+        run("node", "built/program.js", live_server.url, cwd=tmp_path)
     )
     case: Case = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "y0": 2e-6, "f": 20e3}
     right = surrogate.evaluate(**case, v0=0.01)

@@ -535,6 +535,11 @@ PICTURES = {
         "1",
     ),
     "map": ("map", CASE),
+    "motion": (*SHAKEN, "--x", "2um@90deg", "--y", "4um"),
+    "solve-for of a motion": (
+        *("solve-for", "normal.phase", "mu0=0.3 Fz=10N k=0.1N/um f=50Hz v0=5mm/s"),
+        *("--x", "0.1mm", "--normal", "8N", "--target", "0"),
+    ),
     "fit": ("fit", "MEASURED", *RIG, "--contact", "ball"),
 }
 

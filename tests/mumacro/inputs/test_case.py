@@ -59,6 +59,10 @@ TYPED = {
     ("v0", "36 kmh"): 10.0,
     ("v0", "10 ips"): 0.254,
     ("omega", "60 rpm"): 2.0 * math.pi,
+    ("omega", "60 rad/min"): 1.0,
+    ("omega", "180 deg/s"): math.pi,
+    ("omega", "1 rev/s"): 2.0 * math.pi,
+    ("omega", "3 mrad/s"): 3e-3,
     ("f", "1200 rpm"): 20.0,
     ("f", "1200 rev/min"): 20.0,
     ("f", "20 cycles/s"): 20.0,
@@ -277,6 +281,18 @@ def test_usual_cases_zero_and_gaps_are_not_doubted() -> None:
             found = remarks({**CASE, name: value})
             assert [(one.row, one.field, one.cases) for one in found] == expected
     assert remarks({name: np.zeros(0) for name in CASE}) == []
+
+
+@pytest.mark.parametrize(
+    ("changed", "row"),
+    [
+        ({"y0": 0.0, "omega": 0.0}, "model"),
+        ({"k": 1e8, "y0": 1e-7, "omega": 1.0, "v0": 100.0}, "units"),  # v~ = 3e9
+        ({"k": 1e12, "y0": 1e-2}, "units"),  # y~ = 3e9
+    ],
+)
+def test_a_case_gets_one_remark(changed: dict[str, float], row: str) -> None:
+    assert [one.row for one in remarks({**CASE, **changed})] == [row]
 
 
 def test_a_rigid_contact_is_told_what_it_assumes() -> None:

@@ -140,6 +140,15 @@ READ: dict[str, str | bytes] = {
     ),
     "YAML above": "---\nrig: 7\nunits:\n  v0: mm/s\n---\nv0,mu_macro\n" + PLAIN,
     "numbers of the columns above": "1,2\n" + HEAD + PLAIN,
+    "units three lines above the names": (
+        "mm/s,-\n# step 0\n# step 1\n# step 2\nv0,mu_macro\n" + PLAIN
+    ),
+    "brackets between blanks": "v0 (mm/s) mu_macro (-)\n" + rows("{v} {m}"),
+    "square brackets between blanks": "v0 [mm/s] mu_macro [-]\n" + rows("{v} {m}"),
+    "empty cells behind rows with a header below": HEAD + "1,0.069,\n2,0.097,\n" + HEAD + MIDDLE,
+    "an empty cell beyond the header": HEAD + "1,0.069, ,\n2,0.097\n" + MIDDLE,
+    "a row that is commented out": HEAD + BEGIN + "#3,0.1\n" + MIDDLE,
+    "a quote in a comment": HEAD + '1,0.069\n# a,"b\n2,0.097\n# "\n' + MIDDLE,
     "units said twice": "v0,mu_macro\nmm/s,-\nmm/s,-\n" + PLAIN,
 }
 #: what is refused
@@ -226,6 +235,7 @@ REFUSED: dict[str, tuple[str, Refused]] = {
     ),
     "title of a segment": (HEAD + BEGIN + "\nSegment 2\n" + MIDDLE, Refused(5, "--rows 2..4")),
     "label of a row behind it": (HEAD + BEGIN + ",Mittelwert:\n", Refused(4, "--rows 2..3")),
+    "a cell beyond the header": (HEAD + "1,0.069\n2,0.097,7\n", Refused(3, "has 3 cells")),
     "overload": (HEAD + "1,0.069\n2,OVER\n", Refused(3, "--rows 2..2")),
 }
 

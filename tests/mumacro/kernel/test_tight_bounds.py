@@ -129,18 +129,10 @@ def test_a_ball_is_never_beyond_its_bounds(tolerance: float) -> None:
 
 
 @pytest.mark.parametrize("name", ["v0", "y0", "mu0"])
-def test_the_bound_of_the_standard_deviation_may_not_be_halved(client: Any, name: str) -> None:
+def test_the_bound_of_the_standard_deviation_may_not_be_halved(name: str) -> None:
     def ask(s: Surrogate, v: Array, y: Array) -> Any:
-        columns = {
-            **UNIT,
-            "y0": y.tolist(),
-            "v0": v.tolist(),
-            "include": ["std"],
-            f"std_{name}": 1e-3,
-        }
-        reply = client.post("/v1/mu-macro/batch", json={**columns, "tolerance": s.tolerance})
-        assert reply.status_code == 200, reply.text
-        return [np.array(reply.json()[part], dtype=float) for part in ("std", "std_bound")]
+        answer = s.evaluate(**UNIT, y0=y, v0=v, **flat({name: 1e-3}))
+        return [answer["std"], answer["std_bound"]]
 
     assert 0.3 < shares(ask, 1e-4, 1500)[0] <= 1.0
 
@@ -432,29 +424,3 @@ def test_the_bound_of_settling_is_what_the_bounds_of_ratio_and_power_leave_open(
     assert decay.error_bound == close(
         math.log(100.0) / (decay.slip_path - less) - decay.periods, rel=1e-9
     )
-
-
-def test_the_standard_deviation_adds_the_inputs_in_squares(client: Any, case: Case) -> None:
-    """The part of every input alone, its bound too, then all together."""
-    each = {"mu0": 0.01, "Fz": 0.5, "k": 2e5, "y0": 3e-7, "omega": 2e3, "v0": 1e-3}
-
-    def answer_to(std: Case) -> Any:
-        return client.post(
-            "/v1/mu-macro",
-            json={**case, "include": ["std", "gradient"]} | flat(std),
-        ).json()
-
-    alone, together = (
-        {name: answer_to({name: value}) for name, value in each.items()},
-        answer_to(each),
-    )
-    for name, answer in alone.items():
-        assert answer["std"] == close(abs(answer["gradient"][name]) * each[name], rel=1e-14)
-        assert answer["std_bound"] == close(answer["gradient_bound"][name] * each[name], rel=1e-14)
-        assert together["std_share"][name] == close(
-            (answer["std"] / together["std"]) ** 2, rel=1e-13
-        )
-    for part in ("std", "std_bound"):
-        assert together[part] == close(
-            math.sqrt(sum(answer[part] ** 2 for answer in alone.values())), rel=1e-13
-        )

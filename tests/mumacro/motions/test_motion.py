@@ -708,20 +708,6 @@ def test_the_command_has_the_librarys_answer(capsys: Capture) -> None:
     assert ball["mu_macro"] == motion(**SCENE, y=2e-6, contact="ball").mu_macro
 
 
-def test_the_command_writes_pictures_and_csv(capsys: Capture, tmp_path: Any) -> None:
-    pytest.importorskip("matplotlib")
-    words = (COMMAND, "--x", "2um@90deg", "--y", "4um")
-    for ending, begin in ((".png", b"\x89PNG"), (".svg", b"<?xml")):
-        out = tmp_path / f"cycle{ending}"
-        assert f"written: {out}" in output_of(capsys, 0, *words, "-o", str(out))
-        assert out.read_bytes().startswith(begin)
-    output_of(capsys, 0, *words, "-o", str(tmp_path / "cycle.csv"))
-    head, *rows = (tmp_path / "cycle.csv").read_text().splitlines()
-    assert head == "t [s],x [m],y [m],Fx [N],Fy [N],Fz [N]"
-    assert len(rows) == 401
-    assert "ends in .png" in output_of(capsys, 2, *words, "-o", str(tmp_path / "cycle.xyz"))
-
-
 def test_the_picture_has_forces_and_path() -> None:
     figure = pytest.importorskip("matplotlib.figure").Figure()
     forces = motion(**SCENE, x=(2e-6, 90.0), y=4e-6).plot(figure.subplots(1, 2))

@@ -122,7 +122,7 @@ def test_what_cannot_be_solved_names_its_field(unknown: str, changed: Any, field
         mumacro.solve_motion(unknown, **{**CONVEYOR, "normal": 8.0, **changed})
 
 
-def test_the_command_gives_the_librarys_roots(capsys: Any, tmp_path: Any) -> None:
+def test_the_command_gives_the_librarys_roots(capsys: Any) -> None:
     words = ["solve-for", "normal.phase", "mu0=0.3 Fz=10N k=0.1N/um f=50Hz v0=5mm/s"]
     words += ["--x", "0.1mm", "--normal", "8N", "--target", "0"]
     assert main([*words, "--json"]) == 0
@@ -135,10 +135,6 @@ def test_the_command_gives_the_librarys_roots(capsys: Any, tmp_path: Any) -> Non
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 2 + len(expected)
     assert lines[2].split()[-1] == "0"  # a mean within its estimate of 0
-    pytest.importorskip("matplotlib")
-    picture = tmp_path / "roots.png"
-    assert main([*words, "-o", str(picture)]) == 0
-    assert picture.stat().st_size > 5000
     words[1] = "v0"
     words[2] = "mu0=0.3 Fz=10N k=0.1N/um f=50Hz"
     assert main([*words[:-4], "--normal", "8N@90deg", "--target", "0"]) == 1
