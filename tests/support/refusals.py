@@ -11,8 +11,9 @@ from mumacro import InputError
 @contextmanager
 def refused(place: str) -> Iterator[pytest.ExceptionInfo[InputError]]:
     """The block raises :class:`InputError` for this input: ``"v0"``, or ``"v0[1]"`` for one value
-    of an array."""
+    of an array, ``"v0[*]"`` for it or any of its values."""
     with pytest.raises(InputError) as caught:
         yield caught
     error = caught.value
-    assert place == error.field + ("" if error.index is None else f"[{error.index}]"), error
+    told = error.field + ("" if error.index is None else f"[{error.index}]")
+    assert place in (told, f"{error.field}[*]"), error
