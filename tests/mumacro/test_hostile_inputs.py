@@ -173,31 +173,12 @@ def test_evaluate_names_a_value_that_is_not_a_number(
         table.evaluate(case)
 
 
+#: zero, the ends of double range, seams, and what is illegal
 EXTREMES = [
-    0.0,
-    -0.0,
-    5e-324,
-    1e-310,
-    1e-200,
-    1e-150,
-    1e-100,
-    1e-15,
-    0.75,
-    1.0,
-    1.5,
-    3.0,
-    32.0,
-    2.0**17,
-    1e100,
-    1e150,
-    1e200,
-    1.7976931348623157e308,
-    math.inf,
-    -math.inf,
-    math.nan,
-    -1.0,
-    -1e300,
-    -5e-324,
+    *(0.0, -0.0, 5e-324, 1e-310, 1e-200, 1e-150, 1e-100, 1e-15),
+    *(0.75, 1.0, 1.5, 3.0, 32.0, 2.0**17),
+    *(1e100, 1e150, 1e200, 1.7976931348623157e308, math.inf),
+    *(-math.inf, math.nan, -1.0, -1e300, -5e-324),
 ]
 
 

@@ -249,15 +249,6 @@ def test_a_solution_without_one_root_has_no_value(
     assert says in str(error.value)
 
 
-def test_a_solution_says_why_there_is_no_root(surrogate: Surrogate) -> None:
-    solution = mumacro.solve_for(surrogate, "y0", [0.15, 0.5], **without("y0"))
-    assert solution.reason(0) == ""
-    assert "out of reach" in solution.reason(1)
-    assert solution.reason(1) in solution.to_dict()["results"][1]["reason"]
-    still = mumacro.solve_for(surrogate, "v0", 0.2, **{**without("v0"), "y0": 0.0})
-    assert "no influence" in still.reason()
-
-
 # --- signatures -----------------------------------------------------------------------------------
 
 

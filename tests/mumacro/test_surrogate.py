@@ -149,43 +149,6 @@ def test_power_at_large_speed_is_that_of_the_shaker_against_friction(
 # --- scalars and arrays ---------------------------------------------------------------------------
 
 
-def test_scalars_and_arrays_agree_bit_for_bit(table: Surrogate) -> None:
-    rng, n = np.random.default_rng(6), 400
-    ranges = ((0.1, 1.0), (1e-3, 1e4), (1e3, 1e9), (1e-9, 1e-3), (1.0, 1e6), (1e-9, 10.0))
-    columns: Case = {
-        name: log_uniform(rng, *ends, n) for name, ends in zip(CASE, ranges, strict=True)
-    }
-    columns["v0"][::7] = columns["y0"][::11] = 0.0
-    whole: Any = table.evaluate(**columns, gradient=True)
-    plain = table.evaluate(**columns)
-    assert len(set(whole.source)) >= 6
-    for name in ("v_tilde", "y_tilde", "length_scale"):
-        with pytest.raises(AttributeError, match=f"{name} was not requested"):
-            getattr(plain, name)
-        np.testing.assert_array_equal(
-            getattr(table.evaluate(**columns, include="groups"), name), getattr(whole, name)
-        )
-    np.testing.assert_array_equal(plain.mu_macro, whole.mu_macro)
-    names = (
-        "mu_macro",
-        "mu_ratio",
-        "error_bound",
-        "v_tilde",
-        "y_tilde",
-        "length_scale",
-        "regime",
-        "source",
-    )
-    for i in range(n):
-        case: Case = {name: float(values[i]) for name, values in columns.items()}
-        one = table.evaluate(**case, gradient=True)
-        for name in (*names, "regime_code", "regime_certain"):
-            assert getattr(one, name) == getattr(whole, name)[i], name
-        for name in columns:
-            assert one.gradient[name] == whole.gradient[name][i]
-            assert one.gradient_bound[name] == whole.gradient_bound[name][i]
-
-
 @pytest.mark.parametrize("n", [1, 2, 300])
 def test_a_value_for_all_cases_may_come_as_a_number_or_as_an_array_of_one(
     fine: Surrogate, n: int

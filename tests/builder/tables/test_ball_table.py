@@ -26,7 +26,6 @@ from mumacro.table.netcdf import read_table, write_table
 from tests.support.cases import Array, opened
 from tests.support.comparing import close
 from tests.support.places import TABLES
-from tests.support.refusals import refused
 
 COARSE = 1e-7
 
@@ -325,32 +324,3 @@ def test_an_error_of_a_block_is_found(contact: SolvedContact) -> None:
 
 
 # --- plain numbers --------------------------------------------------------------------------------
-
-
-def test_plain_numbers_answer_as_arrays_do() -> None:
-    table = opened(COARSE)
-    v, y = wide(40, 6)
-    v[:3], y[:4] = (0.0, 0.0, 0.2), (0.0, 0.5, 0.0, 1.5)
-    for name in QUANTITY_NAMES:
-        rows = table.quantity(name, v, y, contact="ball")
-        for i in range(v.size):
-            one = table.quantity(name, float(v[i]), float(y[i]), contact="ball")
-            assert one == tuple(row[i] for row in rows), (name, i)
-    case: Any = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1e5, "contact": "ball"}
-    v0, y0 = 0.3 * v, 3e-6 * y
-    many = table.evaluate(**case, v0=v0, y0=y0, gradient=True)
-    for i in range(v.size):
-        alone = table.evaluate(**case, v0=float(v0[i]), y0=float(y0[i]), gradient=True)
-        assert (alone.mu_macro, alone.error_bound) == (many.mu_macro[i], many.error_bound[i])
-        assert (alone.source_code, alone.regime) == (many.source_code[i], many.regime[i])
-        assert alone.gradient == {name: x[i] for name, x in many.gradient.items()}
-        assert alone.regime_certain == many.regime_certain[i]
-
-
-@pytest.mark.parametrize(("name", "value"), [("mu0", -0.3), ("v0", math.nan), ("k", 0.0)])
-def test_an_illegal_plain_number_is_named(name: str, value: float) -> None:
-    case: Any = {"mu0": 0.3, "Fz": 10.0, "k": 1e6, "omega": 1e5, "y0": 2e-6, "v0": 0.01}
-    with refused(name):
-        opened(COARSE).evaluate(**{**case, name: value}, contact="ball")
-    with refused("v_tilde"):
-        opened(COARSE).quantity("mu_ratio", -1.0, 0.5, contact="ball")

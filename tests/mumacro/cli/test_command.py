@@ -283,17 +283,6 @@ def test_a_law_along_the_frequency_is_one_along_omega_and_marks_the_border(capsy
     assert "border of continuous sliding at f" in text
 
 
-def test_a_range_of_k_is_told_with_that_of_mu_macro_and_checked(capsys: Capture) -> None:
-    words = CASE.replace("1e6", "0.1..100 N/um")
-    answer = json.loads(output_of(capsys, 0, words, "--json"))
-    text = output_of(capsys, 0, words)
-    assert "k = 0.1 to 100 N/um" in text.splitlines()[0]
-    assert f"{answer['mu_macro_low']:#.4g}" in text
-    assert "k is known" not in text
-    for wrong in ("2..1", "0..1", "1..inf", "a..2"):
-        assert "k must be" in output_of(capsys, 2, CASE.replace("1e6", wrong))
-
-
 KINDS: dict[str, tuple[str, Case, Case]] = {
     "spring": (CASE, {}, {}),
     "rigid": (CASE.replace("1e6", "rigid"), {}, {"k": "rigid"}),

@@ -162,32 +162,6 @@ def test_a_fold_has_its_three_roots_stretched(surrogate: Surrogate, m: float) ->
     assert len(folded.roots[0]) == 3
 
 
-@pytest.mark.parametrize("contact", ["spring", pytest.param("ball", marks=pytest.mark.slow)])
-@settings(max_examples=15, deadline=None)
-@given(log_v0=st.floats(-5.0, 0.0), share=st.floats(0.001, 0.999), m=st.floats(0.1, 0.8))
-def test_no_root_is_missed(
-    surrogate: Surrogate, contact: Any, log_v0: float, share: float, m: float
-) -> None:
-    case = {**CASE, "v0": 10.0**log_v0}
-    loads = CASE["Fz"] * np.geomspace(1e-9, 1e9, 20_001)
-    mu = surrogate.evaluate(**grown(case, m, loads), contact=contact).mu_macro
-    target = float(mu[int(share * 20_000)])
-    # not on a plateau, where all are roots
-    assume(mu.min() * (1.0 + 1e-9) < target < mu.max() * (1.0 - 1e-9))
-    above = mu > target * (1.0 + 1e-12)
-    solution = solve_for(
-        surrogate,
-        "Fz",
-        target,
-        within=(loads[0], loads[-1]),
-        contact=contact,
-        stiffness_exponent=m,
-        **case,
-    ).roots[0]
-    assert len(solution) >= np.count_nonzero(above[1:] != above[:-1])
-    assert all(root.mu_macro == close(target, rel=1e-10) for root in solution)
-
-
 @pytest.mark.parametrize("pair", PAIRS, ids=" ".join)
 @pytest.mark.parametrize("v0", [1e-3, 0.05, 0.3])
 def test_the_border_is_where_the_regime_changes(surrogate: Surrogate, pair: Any, v0: float) -> None:

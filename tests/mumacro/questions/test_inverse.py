@@ -390,11 +390,3 @@ def test_an_interval_of_k_is_solved_for_at_both_ends(surrogate: Surrogate) -> No
         )
     with refused("k_low"):
         solve_for(surrogate, "k", 0.15, **{**without(CASE, "k"), "k_low": 8e5, "k_high": 1.25e6})
-
-
-def test_the_value_of_a_solution_without_a_root_says_why(surrogate: Surrogate) -> None:
-    solution = solve_for(surrogate, "v0", 0.4, **without(CASE, "v0"))
-    with refused("value") as error:
-        _ = solution.value
-    assert "there is none: mu_macro = 0.4 is out of reach" in str(error.value)
-    assert ", got" not in str(error.value)
