@@ -127,7 +127,7 @@ def test_the_rows_that_are_named_are_read(rigs: Path, name: str, rows: tuple[int
     assert points.lines == [*range(rows[0], rows[1] + 1)]
 
 
-def test_units_between_the_rows_that_are_named_are_refused() -> None:
+def test_units_between_the_rows_that_are_named_are_told() -> None:
     text = "v0,mu_macro\n10,0.2\n# v0: speed [mm/s]\n20,0.3\n"
     assert "line 3: v0 is in mm/s, the rows before are in m/s" in str(refused(text, rows=(2, 4)))
 
@@ -291,7 +291,7 @@ def test_bytes_after_ascii_are_windows_1252_unless_they_are_mixed() -> None:
     assert "0x81" in str(refused(head.encode() + b"\x81"))
 
 
-def test_a_text_that_is_not_in_the_encoding_that_is_named_is_refused() -> None:
+def test_a_text_that_is_not_in_the_encoding_that_is_named_is_told() -> None:
     fault = refused("v0,mu_macro\n1,0.2\n", encoding="utf-16")
     assert "give utf-16-le or utf-16-be" in str(fault)
 
