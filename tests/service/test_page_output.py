@@ -771,6 +771,8 @@ def test_a_remedy_is_one_of_the_page(open_page: Any) -> None:
         page.type(f"#field-{field}", text)
         assert page.text(f"#note-{field}").startswith("must be ")
         assert not re.search(r"--\w|mumacro ", page.text(f"#note-{field}"))
+    page.type("#field-f", "20 foo")
+    assert page.text("#note-f") == "must be in hertz, such as Hz, kHz, MHz, rpm"
     page.type("#field-k", "5 psi")
     assert page.text("#part-stiffness h2") in page.text("#note-k")
 

@@ -147,9 +147,11 @@ export function around(k, share = 0.1) {
   return `${low.split(" ")[0]}..${high}`;
 }
 
-/** A sentence of the service in the page's signs, and a stiffness in it in the page's units. */
+/** A sentence of the service in the page's signs, and a stiffness in it in the page's units; that a
+ * plain number is in SI is not so here, where it has the unit of its field. */
 export const prose = (text) =>
   text
+    .replace(": a plain number, or with a unit such as", ", such as")
     .replace(/(\d[\d.]*(?:e[+-]?\d+)?) N\/m\b(?!\w)/g, (_, k) =>
       inUnit("k", Number(k), undefined, 3),
     )
