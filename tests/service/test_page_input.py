@@ -80,6 +80,30 @@ def test_what_was_understood_moves_no_field(open_page: Any, width: int) -> None:
         assert page.run(places) == before, text
 
 
+@pytest.mark.parametrize(
+    ("address", "along", "up"),
+    [
+        ("v0=10 ± 6 mm/s", True, False),
+        ("y0=2 ± 1.2 um", False, True),
+        ("k=1 ± 0.6 N/um", True, True),  # which moves the point along both axes at once
+        ("k=1 ± 0.6 N/um&y0=2 ± 1.2 um", True, True),
+        ("direction=normal&Fz=10 ± 4 N", True, True),
+    ],
+)
+def test_a_deviation_on_the_map_has_the_direction_of_its_cause(
+    open_page: Any, address: str, along: bool, up: bool
+) -> None:
+    page = open_page(f"#{address}", width=1280, height=800)
+    shape, box = page.run(
+        "const one = document.querySelector('#map path.deviation');"
+        "const { width, height } = one.getBBox();"
+        "return [one.getAttribute('d'), [width, height]];"
+    )
+    assert [size > 12 for size in box] == [along, up]  # its caps have ten pixels
+    assert ("A" in shape) is ("&y0" in address)  # two causes are an ellipse, one is a bar
+    assert len(page.texts("#map .deviation")) == 1
+
+
 def test_a_deviation_stands_beside_the_number(open_page: Any, surrogate: Surrogate) -> None:
     page = open_page("#k=1 ± 0.1 N/um&mu0=0.3 ± 0.02")
     answer = surrogate.evaluate(**START, gradient=True)

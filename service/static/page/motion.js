@@ -154,21 +154,6 @@ export function motionPanel(store, moved, copy) {
     </div>`;
   }
 
-  /** A motion with a speed at which it carries the body by itself. */
-  const conveyor = () =>
-    store.change({
-      ...about.start,
-      contact: "spring",
-      x: "2 µm @ 90 deg",
-      y: "",
-      normal: "5 N @ -90 deg",
-      motion_unknown: "v0",
-      motion_target: "0",
-    });
-  const example = html`<p class="ways">
-    Example: <button type="button" id="conveyor" @click=${conveyor}>conveyor</button>
-  </p>`;
-
   /** The number of the motion, and what it says, in the card of the answer. */
   function headline(known, error) {
     const { mu_macro: mu, inputs, stick_fraction: stick } = motion;
@@ -269,7 +254,7 @@ export function motionPanel(store, moved, copy) {
 
   function draw() {
     const { state } = store;
-    render([...PARTS.map(field), example], $("motion-form"));
+    render(PARTS.map(field), $("motion-form"));
     if (motion) numbers();
     render(roots(), $("motion-roots"));
     tell();
@@ -378,6 +363,18 @@ export function motionPanel(store, moved, copy) {
   }
 
   $("motion-form").addEventListener("submit", (event) => event.preventDefault());
+  // a motion with a speed at which it carries the body by itself
+  $("conveyor").addEventListener("click", () =>
+    store.change({
+      ...about.start,
+      contact: "spring",
+      x: "2 µm @ 90 deg",
+      y: "",
+      normal: "5 N @ -90 deg",
+      motion_unknown: "v0",
+      motion_target: "0",
+    }),
+  );
   for (const form of ["motion-form", "motion-target-form"])
     $(form).addEventListener("change", ({ target: { name, value } }) =>
       store.change({ [name]: value }),

@@ -264,7 +264,9 @@ export function numberPanel(store) {
       return;
     }
     const { value, std } = headline(answer, store.state.digits === "all");
-    $("number").classList.toggle("long", value.length + (std ?? "").length / 2 > 12);
+    const length = value.length + (std ?? "").length / 2;
+    $("number").classList.toggle("wide", length > 12 && length <= 16);
+    $("number").classList.toggle("long", length > 16);
     const deviation = std
       ? html`<wbr /><span id="std"> ± ${std}</span> <span id="std-name">(1 std. dev.)</span>`
       : nothing;
