@@ -336,15 +336,9 @@ def client_of(scope: Scope) -> str:
     return address[:64]
 
 
-def ticket_in(scope: Scope) -> Ticket | None:
-    """Return the ticket of a request, if it holds something."""
-    ticket: Ticket | None = scope.get(TICKET)
-    return ticket
-
-
 def ticket_of(scope: Scope) -> Ticket:
     """Return the ticket of a request; :class:`~service.problems.Failures` takes it back."""
-    ticket = ticket_in(scope)
+    ticket: Ticket | None = scope.get(TICKET)
     if ticket is None:
         ticket = scope[TICKET] = Ticket(scope)
     return ticket

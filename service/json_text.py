@@ -7,23 +7,15 @@ Infinity and integers of any size, which are refused later with their fields.
 """
 
 import json
-import math
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping
-from functools import lru_cache, partial
-from itertools import chain
-from operator import attrgetter
-from typing import Any, Literal
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
 
 import msgspec
-import numpy as np
 import orjson
 from starlette.responses import Response
-
-from mumacro.inputs.fields import RIGID
-from mumacro.kernel.arrays import Array
-from mumacro.kernel.stopping import look
 
 from .problems import FieldFault, ProblemKind, RequestError, refuse
 
@@ -114,133 +106,10 @@ def _few_members(value: Any, path: tuple[str | int, ...] = ()) -> None:
 
 # --- a batch --------------------------------------------------------------------------------------
 
-_NUMBERS = msgspec.json.Decoder(list[float])
-
 
 def decode_batch(text: bytearray) -> Any:
     """Return any JSON as Python objects, slowly; if a name occurs twice, the last value counts."""
     return _slowly(text, _OF_BATCHES)
-
-
-def decode_columns(text: bytearray, numbers: Collection[str], rest: Collection[str]) -> Any:
-    """Return the members of an object: a list in ``numbers`` becomes an array if it holds only
-    numbers.
-
-    Raise one of :data:`NotRead` if a name is neither in ``numbers`` nor in ``rest``.
-    """
-    found = _members(tuple(numbers), tuple(rest))(text)
-    members = {name: getattr(found, name) for name in found.__struct_fields__}
-    return {
-        name: _column(value) if isinstance(value, msgspec.Raw) else value
-        for name, value in members.items()
-        if value is not msgspec.UNSET
-    }
-
-
-def _column(value: msgspec.Raw) -> Any:
-    try:
-        return np.array(_NUMBERS.decode(value), np.float64)
-    except msgspec.ValidationError:
-        return orjson.loads(memoryview(value))
-
-
-@lru_cache(maxsize=1)
-def _members(numbers: tuple[str, ...], rest: tuple[str, ...]) -> Callable[[bytearray], Any]:
-    """Return the function that splits an object into members and leaves the texts of ``numbers``
-    unread."""
-    kinds: list[tuple[str, Any, Any]] = [(name, msgspec.Raw, msgspec.UNSET) for name in numbers]
-    kinds += [(name, Any, msgspec.UNSET) for name in rest]
-    members = msgspec.defstruct("Members", kinds, forbid_unknown_fields=True)
-    return msgspec.json.Decoder(members).decode
-
-
-def decode_rows(
-    text: bytearray, numbers: Collection[str], words: Mapping[str, tuple[str, ...]]
-) -> dict[str, Any]:
-    """Return rows as columns: arrays of numbers, with an infinite k for the word rigid, and lists
-    of words.
-
-    Raise one of :data:`NotRead` if a row has other names than the first one, if a name is in
-    neither ``numbers`` nor ``words``, or if a value is neither a number nor a word that its name
-    may have.
-    """
-    names = _first_names(text)
-    if not {*names} <= {*numbers, *words}:
-        raise ValueError("an unknown name")
-    numbers = tuple(name for name in names if name in numbers)
-    if len(numbers) < 2:  # attrgetter makes no tuple of one
-        raise ValueError("no case has one number")
-    listed = {name: list[str]() for name in names if name in words}
-    decoded = _rows(names, numbers, tuple(words[name] for name in listed))
-    values_of = attrgetter(*numbers) if listed else msgspec.structs.astuple
-    parts = list[Array]()
-    for piece in _pieces(text):
-        look()
-        rows = decoded(piece)
-        if not rows:
-            raise ValueError("no row behind a comma")
-        parts.append(_table(rows, values_of, len(numbers)))
-        for name, column in listed.items():
-            column.extend(map(attrgetter(name), rows))
-    columns = np.empty((len(numbers), sum(part.shape[1] for part in parts)))
-    np.concatenate(parts, axis=1, out=columns)
-    return dict(zip(numbers, columns, strict=True)) | listed
-
-
-def _pieces(text: bytearray) -> Iterator[bytes]:
-    """Yield a list of rows as lists of about ``_PIECE`` bytes.
-
-    Names and words of a row have no brace.  If a text has one, the piece that ends there is not
-    JSON, and is refused.
-    """
-    start = text.index(b"[") + 1
-    while comma := _COMMA.match(text, text.find(b"}", start + _PIECE) + 1):
-        yield b"[" + text[start : comma.start()] + b"]"
-        start = comma.end()
-    yield b"[" + text[start:]
-
-
-def _table(rows: list[Any], values_of: Callable[[Any], Any], width: int) -> Array:
-    """Return the numbers of rows, a column for each name."""
-    size = len(rows) * width
-    try:
-        table = np.fromiter(chain.from_iterable(map(values_of, rows)), np.float64, size)
-    except ValueError:  # the word rigid
-        values = chain.from_iterable(map(values_of, rows))
-        infinite = (math.inf if value == RIGID else value for value in values)
-        table = np.fromiter(infinite, np.float64, size)
-    return table.reshape(-1, width).T
-
-
-def _first_names(text: bytearray) -> tuple[str, ...]:
-    """Return the names of the first row."""
-    first = orjson.loads(text[text.index(b"[") + 1 : text.index(b"}") + 1])
-    if not isinstance(first, dict):
-        raise ValueError("the first row is no case")
-    return tuple(first)
-
-
-@lru_cache(maxsize=64)
-def _rows(
-    names: tuple[str, ...], numbers: tuple[str, ...], allowed: tuple[tuple[str, ...], ...]
-) -> Callable[[bytes], Any]:
-    """Return the function that reads rows with these names in any order.  A name that is not in
-    ``numbers`` has one of its words in ``allowed``.  This takes half of the time of rows that are
-    dictionaries."""
-    words = (Literal[one] for one in allowed)
-    kinds: dict[str, Any] = {name: float if name in numbers else next(words) for name in names}
-    if "k" in kinds:
-        kinds["k"] = float | Literal["rigid"]
-    row = msgspec.defstruct("Row", [*kinds.items()], forbid_unknown_fields=True, gc=False)
-    return msgspec.json.Decoder(list[row]).decode  # type: ignore[valid-type]
-
-
-def count(text: bytes | bytearray, character: bytes) -> int:
-    """Return how often a character occurs in a text; ``text.count`` is slower if it occurs
-    often."""
-    codes, code = np.frombuffer(text, np.uint8), character[0]
-    starts = range(0, codes.size, _COUNTED)
-    return sum(int(np.count_nonzero(codes[i : i + _COUNTED] == code)) for i in starts)
 
 
 # --- answers --------------------------------------------------------------------------------------

@@ -7,8 +7,8 @@ k or its interval, the amplitude of the direction) when it evaluates.
 
 import math
 import sys
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, NamedTuple
+from contextlib import suppress
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import (
@@ -24,14 +24,15 @@ from pydantic import (
 from mumacro.errors import InputError
 from mumacro.inputs.case import no_number, reason_of
 from mumacro.inputs.cases import DEVIATIONS, EXACT, one_word
+from mumacro.inputs.columns import Column, Fault
 from mumacro.inputs.fields import (
     BOUNDS,
     MOST_HZ,
     POSITIVE,
-    RIGID,
     ContactName,
     DirectionName,
     described,
+    is_rigid,
     refusal,
 )
 from mumacro.kernel.arrays import Array
@@ -217,14 +218,6 @@ class OtherInputs(_Inputs):
 # --- columns --------------------------------------------------------------------------------------
 
 
-class Column(NamedTuple):
-    """Hold one input of many cases: numbers, with NaN for a missing one, and by the index of the
-    case the reason why it is missing."""
-
-    numbers: Array
-    reasons: Mapping[int, str]
-
-
 _LEAST = {name: 5e-324 if name in POSITIVE else 0.0 for name in BOUNDS}
 _LEAST |= dict.fromkeys(DEVIATIONS, 0.0)
 _MOST = dict.fromkeys(_LEAST, sys.float_info.max) | {"f": MOST_HZ}
@@ -232,72 +225,53 @@ _NUMBERS = frozenset((float, int))
 _NO_TEXTS = "must be numbers: a column has no texts; a text with a unit is for one case"
 
 
-def is_rigid(value: object) -> bool:
-    """Return whether a value is the word for an infinite stiffness."""
-    return isinstance(value, str) and value.strip().lower() == RIGID
-
-
-def not_a_number(name: str, value: object) -> str:
-    """Return the reason why a value that is not a number is refused where programs send numbers."""
-    if name == "k" and isinstance(value, str):
-        return "must be a number, or the word rigid, and no other text"
-    return no_number(name, value)
-
-
 def entry(name: str, value: object) -> tuple[float, str | None]:
     """Return the number of an input and None, or NaN and the reason why there is no number."""
+    if type(value) in _NUMBERS:
+        try:
+            number = float(value)  # type: ignore[arg-type]
+        except OverflowError:
+            number = math.inf
+        if _LEAST[name] <= number <= _MOST[name]:
+            return number, None
+        return math.nan, refusal(name, number) if name in BOUNDS else f"must be {EXACT}"
     if name == "k" and is_rigid(value):
         return math.inf, None
-    if type(value) not in _NUMBERS:
-        return math.nan, not_a_number(name, value)
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except OverflowError:
-        number = math.inf
-    if _LEAST[name] <= number <= _MOST[name]:
-        return number, None
-    return math.nan, refusal(name, number) if name in BOUNDS else f"must be {EXACT}"
-
-
-def column(name: str, values: Sequence[Any]) -> Column:
-    """Return a list as a column.  A number beyond double range never becomes a rigid contact."""
-    if _NUMBERS.issuperset(map(type, values)):
-        try:
-            array = np.array(values, np.float64)
-        except OverflowError:
-            array = np.array([math.inf])
-        if np.isfinite(array).all():
-            return Column(array, {})
-    if all(isinstance(value, str) and not (name == "k" and is_rigid(value)) for value in values):
-        raise fault(_NO_TEXTS)
-    numbers, reasons = np.empty(len(values)), dict[int, str]()
-    for i, value in enumerate(values):
-        numbers[i], reason = entry(name, value)
-        if reason is not None and len(reasons) < MAX_REASONS:
-            reasons[i] = reason
-    return Column(numbers, reasons)
+    if name == "k" and isinstance(value, str):
+        return math.nan, "must be a number, or the word rigid, and no other text"
+    return math.nan, no_number(name, value)
 
 
 _ALWAYS = ("mu0", "Fz", "k", "v0")  # these refuse null
 
 
-def cells(name: str, value: Any) -> float | Column | None:
-    """Return one number for all cases, or a column from a list or an array with a number for
-    each."""
-    if isinstance(value, list):
-        return column(name, value)
-    if isinstance(value, np.ndarray):
-        return Column(value, {})
-    if value is None and name not in _ALWAYS:
-        return None
-    number, reason = entry(name, value)
-    if reason is not None:
-        raise fault(reason)
-    return number
+def cells(value: Any, info: ValidationInfo) -> float | Array | Column | None:
+    """Return one number for all cases, or a column with a number for each.  A list has a gap with a
+    reason where it holds no legal number.
 
-
-def _of_cases(value: Any, info: ValidationInfo) -> float | Column | None:
-    return cells(info.field_name or "", value)
+    A number beyond double range never becomes a rigid contact.
+    """
+    name = info.field_name or ""
+    if isinstance(value, np.ndarray) or (value is None and name not in _ALWAYS):
+        return value
+    if not isinstance(value, list):
+        number, reason = entry(name, value)
+        if reason is not None:
+            raise fault(reason)
+        return number
+    if _NUMBERS.issuperset(map(type, value)):
+        with suppress(OverflowError):
+            array = np.array(value, np.float64)
+            if np.isfinite(array).all():
+                return array
+    if all(isinstance(one, str) and not (name == "k" and is_rigid(one)) for one in value):
+        raise fault(_NO_TEXTS)
+    numbers, gaps = np.empty(len(value)), dict[int, Fault]()
+    for i, one in enumerate(value):
+        numbers[i], reason = entry(name, one)
+        if reason is not None and len(gaps) < MAX_REASONS:
+            gaps[i] = Fault(one, reason)
+    return Column(numbers, faults=gaps)
 
 
 def _one_word(value: Any, info: ValidationInfo) -> Any:
@@ -317,7 +291,7 @@ def _or_listed(one: dict[str, Any], *texts: dict[str, Any]) -> WithJsonSchema:
     return WithJsonSchema({"anyOf": [one, *texts, several]})
 
 
-_CELLS = PlainValidator(_of_cases)
+_CELLS = PlainValidator(cells)
 _ABOVE_ZERO: Any = {"type": "number", "exclusiveMinimum": 0}
 _FROM_ZERO: Any = {"type": "number", "minimum": 0}
 PositiveColumn = Annotated[Any, _CELLS, _or_listed(_ABOVE_ZERO)]
@@ -348,9 +322,3 @@ class InputColumns(Strict):
     Fz_amplitude: NotNegativeColumn = optional(_AMPLITUDE)
     k_low: PositiveColumn = optional(_LOW)
     k_high: PositiveColumn = optional(_HIGH)
-
-    @property
-    def columns(self) -> dict[str, Any]:
-        """Return the members that are there, by name."""
-        values = self.__dict__
-        return {name: x for name in INPUTS if (x := values[name]) is not None}

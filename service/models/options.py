@@ -26,11 +26,11 @@ from .inputs import (
 from .values import OR_ONE, Deviation, Positive
 
 MODEL = "model"  # only for one case
-_BESIDE = (MODEL, UNDERSTOOD)  # options that the library does not compute
+OF_ONE_CASE = (MODEL, UNDERSTOOD)  # what the library does not compute
 if TYPE_CHECKING:
     Include = str
 else:
-    Include = Literal[(*OUTPUTS, *_BESIDE)]
+    Include = Literal[(*OUTPUTS, *OF_ONE_CASE)]
 _INCLUDE = (
     f"More to compute: {', '.join(OUTPUTS)}; for one case model (what it leaves out here); not for "
     "a batch inputs (what was understood of them)"
@@ -113,12 +113,7 @@ class Outputs(Strict):
     @property
     def outputs(self) -> tuple[str, ...]:
         """Return the names that the library knows."""
-        return tuple(name for name in self.include or () if name not in _BESIDE)
-
-    @property
-    def beside(self) -> list[str]:
-        """Return the names that the library does not know: ``model`` and ``inputs``."""
-        return [name for name in self.include or () if name in _BESIDE]
+        return tuple(name for name in self.include or () if name not in OF_ONE_CASE)
 
     @property
     def model(self) -> bool:
@@ -170,14 +165,6 @@ class CaseColumns(DeviationColumns, Outputs, Choice, InputColumns):
     contact: ContactColumn = Field("spring", description=_CONTACT)
     direction: DirectionColumn = Field("across", description=_DIRECTION)
 
-    @property
-    def columns(self) -> dict[str, Any]:
-        """Return all members that the library takes: numbers, and the content of lists."""
-        words = {"contact": self.contact, "direction": self.direction}
-        values = self.__dict__
-        deviations = {name: x for name in DEVIATIONS if (x := values[name]) is not None}
-        return super().columns | words | deviations
-
 
 # --- queries --------------------------------------------------------------------------------------
 
@@ -188,13 +175,6 @@ class BatchOptions(Deviations, Outputs):
     contact: ContactName | None = optional(_CONTACT)
     direction: DirectionName | None = optional(_DIRECTION)
     tolerance: Positive | None = optional(_TOLERANCE)
-
-    @property
-    def members(self) -> dict[str, Any]:
-        """Return the members that are there, as in a body."""
-        names = ("contact", "direction", "tolerance", "include")
-        inputs = {name: value for name in names if (value := getattr(self, name)) is not None}
-        return inputs | self.deviations
 
 
 class TextQuery(CaseRequest):

@@ -9,32 +9,26 @@ a time: several would be no faster and would keep the loop waiting longer.
 
 import math
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from typing import Annotated, Any, TypeVar
 
 from fastapi import Query, Request, Response
 from starlette.types import Receive, Scope, Send
 
-from mumacro.inputs.cases import KIND
 from mumacro.kernel.stopping import look
 
-from ..admission import AT_ONCE, LONG, ticket_in, ticket_of
-from ..batch import Batch
+from ..admission import AT_ONCE, LONG, Ticket, ticket_of
+from ..batch import MORE_CASES, Batch, costs_of_reading
 from ..bodies import JSON, from_client, only_json, read_body, within
-from ..forms import MORE_CASES, read
-from ..json_text import count
 from ..models.inputs import EXAMPLE
 from ..models.options import BatchOptions
-from ..problems import ProblemKind, RequestError
+from ..problems import TICKET, ProblemKind, RequestError
 from . import POST_PROBLEMS, router_of
 
 router = router_of("answers")
 T = TypeVar("T")
 _PIECE = 256 * 1024  # bytes of an answer that are sent at a time
-_BYTES_PER_UNIT = 16  # bytes of a body whose reading has the cost 1, see service/admission.py
-# costs of reading a row, and a text or a null, if Python reads them one by one
-_ROW, _WORD = 400.0, 40.0
 _READS = threading.Lock()
 # time between two checks of a waiting thread whether it must end
 _LOOK_EVERY_S = 0.05
@@ -46,96 +40,61 @@ class _Answer(Response):
     background = None
 
     def __init__(self, request: Request, options: BatchOptions) -> None:
-        self._state, self._options = request.app.state, options
-        self._fields: dict[bytes, bytes] = dict(request.scope["headers"])
-        self._scope = request.scope
-        self._patience: int = self._state.settings.client_timeout_s
-        # HTTP/1.0 has no answer in pieces
-        self._piece = math.inf if request.scope["http_version"] == "1.0" else _PIECE
+        self._state = request.app.state
+        self._query = {name: x for name, x in options if x is not None}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer within the time limit."""
-        del scope
-        async with within(self._state.settings.time_limit_s):
-            await self._answer(receive, send)
+        state, settings = self._state, self._state.settings
+        patience, fields = settings.client_timeout_s, dict[bytes, bytes](scope["headers"])
 
-    async def _answer(self, receive: Receive, send: Send) -> None:
         async def run(work: Callable[[], T], cost: float) -> T:
             """Do the work at once if it is small, otherwise in a thread, so that it delays no other
             request."""
-            return (
-                work() if cost <= AT_ONCE else await ticket_of(self._scope).run(work, cost, receive)
+            return work() if cost <= AT_ONCE else await ticket_of(scope).run(work, cost, receive)
+
+        async with within(settings.time_limit_s):
+            only_json(fields, f"for more cases than a batch may have {MORE_CASES}")
+            reading = read_body(fields, receive, settings.max_body_bytes, scope)
+            text = await from_client(reading, patience)
+            if not text:
+                raise RequestError(ProblemKind.MALFORMED_BODY, "the body is empty")
+            # The cost of reading depends on the bytes, that of computing on the cases: a small body
+            # can request much computation.
+            cost, of_reading = costs_of_reading(text, LONG)
+            most, count = settings.max_batch, state.metrics.cases
+            work = partial(Batch.of, text, self._query, state.tables, most, count)
+            batch = await run(
+                work if of_reading <= AT_ONCE else partial(_in_turn, work), of_reading
             )
-
-        async def give(piece: bytes, unfinished: bool) -> None:
-            message = {"type": "http.response.body", "body": piece, "more_body": unfinished}
-            await from_client(send(message), self._patience)
-
-        only_json(self._fields, f"for more cases than a batch may have {MORE_CASES}")
-        limit = self._state.settings.max_body_bytes
-        text = await from_client(
-            read_body(self._fields, receive, limit, self._scope), self._patience
-        )
-        if not text:
-            raise RequestError(ProblemKind.MALFORMED_BODY, "the body is empty")
-        # The cost of reading depends on the bytes, that of computing on the cases: a small body can
-        # request much computation.
-        cost = len(text) / _BYTES_PER_UNIT
-        of_reading = cost if cost > LONG else cost + _by_one(text)
-        read_it = self._batch if of_reading <= AT_ONCE else self._batch_in_turn
-        batch = await run(partial(read_it, text), of_reading)
-        if ticket := ticket_in(self._scope):
-            ticket.hold(0)  # the text is gone
-        cost += batch.cost
-        pieces = _gathered(batch.write(), self._piece)
-        piece, following = await run(lambda: (next(pieces, b""), next(pieces, None)), cost)
-        headers = [(b"content-type", JSON), (b"x-table", batch.table.id.encode("latin-1"))]
-        if following is None:
-            headers.append((b"content-length", b"%d" % len(piece)))
-        await send({"type": "http.response.start", "status": 200, "headers": headers})
-        while following is not None:
-            await give(piece, unfinished=True)
-            piece, following = following, await run(lambda: next(pieces, None), cost)
-        if ticket := ticket_in(self._scope):
-            ticket.leave()
-        await give(piece, unfinished=False)
-
-    def _batch_in_turn(self, text: bytearray) -> Batch:
-        while not _READS.acquire(timeout=_LOOK_EVERY_S):
-            look()
-        try:
-            return self._batch(text)
-        finally:
-            _READS.release()
-
-    def _batch(self, text: bytearray) -> Batch:
-        state, options = self._state, self._options
-        words = {name: x for name, x in options.members.items() if name in KIND}
-        words |= options.deviations
-        most = state.settings.max_batch
-        body = read(text, most, words)
-        text.clear()
-        return Batch.of(body, options, state.tables, most, count=state.metrics.cases)
+            held: Ticket | None = scope.get(TICKET)
+            if held:
+                held.hold(0)  # the text is gone
+            cost += batch.cost
+            # HTTP/1.0 has no answer in pieces
+            pieces = batch.write(math.inf if scope["http_version"] == "1.0" else _PIECE)
+            piece, following = await run(lambda: (next(pieces), next(pieces, None)), cost)
+            headers = [(b"content-type", JSON), (b"x-table", batch.table.id.encode("latin-1"))]
+            if following is None:
+                headers.append((b"content-length", b"%d" % len(piece)))
+            await send({"type": "http.response.start", "status": 200, "headers": headers})
+            while following is not None:
+                message = {"type": "http.response.body", "body": piece, "more_body": True}
+                await from_client(send(message), patience)
+                piece, following = following, await run(lambda: next(pieces, None), cost)
+            if held := scope.get(TICKET):
+                held.leave()
+            await from_client(send({"type": "http.response.body", "body": piece}), patience)
 
 
-def _by_one(text: bytearray) -> float:
-    """Return the cost of reading the values that Python may have to read one by one; a null has two
-    letters l."""
-    words = (count(text, b'"') + count(text, b"l")) / 2
-    return _ROW * count(text, b"{") + _WORD * words
-
-
-def _gathered(pieces: Iterator[bytes], least: float) -> Iterator[bytes]:
-    """Yield the same bytes in pieces of at least this size."""
-    parts, size = list[bytes](), 0
-    for piece in pieces:
-        parts.append(piece)
-        size += len(piece)
-        if size >= least:
-            yield b"".join(parts)
-            parts, size = [], 0
-    if size:
-        yield b"".join(parts)
+def _in_turn(work: Callable[[], T]) -> T:
+    """Do work while no other thread does work that is called in this way."""
+    while not _READS.acquire(timeout=_LOOK_EVERY_S):
+        look()
+    try:
+        return work()
+    finally:
+        _READS.release()
 
 
 def _ref(name: str) -> dict[str, str]:

@@ -16,7 +16,7 @@ from mumacro.inputs.stiffening import Stiffening
 from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.outputs import MEMBERS
-from mumacro.outputs.answer import Answer, nested
+from mumacro.outputs.answer import TEXTS, Answer, nested
 from mumacro.outputs.evaluation import chosen
 from mumacro.questions.law import Law
 from mumacro.questions.solve_for import TableSolution
@@ -24,7 +24,6 @@ from mumacro.questions.solve_for import TableSolution
 from .. import API_VERSION
 from ..admission import compute
 from ..bodies import understood_in
-from ..forms import listed
 from ..json_text import Json
 from ..models.answers import LawAnswer, SolveForAnswer, SolveMotionAnswer
 from ..models.motion import MOTIONS_OF_A_SEARCH, cost_of
@@ -59,7 +58,9 @@ def _law(question: LawRequest, table: LoadedTable) -> tuple[Law, dict[str, list[
     )
     cases = law.answer.cases
     answer = table.surrogate.answer(cases, chosen(question.outputs, cases))
-    columns = {path: listed(path, answer[path]) for path in answer.paths}
+    columns = {path: column.tolist() for path, column in answer.columns.items()}
+    for path in TEXTS:  # an empty text is written as null
+        columns[path] = [word or None for word in columns[path]]
     columns["mu_static"] = law.mu_static.tolist()
     if law.stiffening is not None:
         columns["k"] = law.inputs["k"].tolist()
@@ -130,9 +131,9 @@ async def get_law_csv(request: Request, question: Annotated[LawRequest, Query()]
         law, columns = _law(question, request.app.state.tables.pick(question.tolerance))
         along = question.along
         heads = {f"{along} [{unit_of(along)}]": law.values.tolist()}
-        for path in sorted(columns, key=lambda path: path in _TEXTS):  # texts last
+        for path in sorted(columns, key=lambda path: path in TEXTS):  # texts last
             row = ["" if value != value else value for value in columns[path]]
-            heads[path if path in _TEXTS else f"{path} [{unit_at(path)}]"] = row
+            heads[path if path in TEXTS else f"{path} [{unit_at(path)}]"] = row
         text = io.StringIO()
         writer = csv.writer(text)
         writer.writerow(heads)
@@ -145,9 +146,6 @@ async def get_law_csv(request: Request, question: Annotated[LawRequest, Query()]
         return Response(text.getvalue(), media_type=kind, headers=headers)
 
     return await compute(request, answer)
-
-
-_TEXTS = ("regime", "source")
 
 
 _BESIDE = {"mu_static": "-", "k": "N/m"}

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Callable
 from typing import Any
 from unittest.mock import patch
 
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from mumacro import Surrogate
 from mumacro.inputs.names import unknown_name
-from service import forms
+from service import rows as rows_of
 from tests.support.cases import Case
 
 BATCH = "/v1/mu-macro/batch"
@@ -262,7 +263,7 @@ CASES: st.SearchStrategy[list[Any]] = st.sampled_from(
 def test_the_advice_for_an_unknown_name_is_looked_for_in_rows_that_are_listed(client: Any) -> None:
     """To find it takes longer than to find that a row is no case."""
     rows = [{**SPRING, f"name{i}": 1} for i in range(1500)]
-    with patch.object(forms, "unknown_name", wraps=unknown_name) as looked:
+    with patch.object(rows_of, "unknown_name", wraps=unknown_name) as looked:
         answer = client.post(BATCH, json=rows).json()
     assert (answer["n_errors"], len(answer["errors"])) == (1500, 1000)
     assert looked.call_count == 1000
@@ -318,6 +319,14 @@ def test_an_amplitude_of_another_direction_is_left_out_or_null(client: Any, numb
     answer = client.post(BATCH, content=json.dumps(columns))
     assert answer.status_code == 422
     assert [fault["field"] for fault in answer.json()["errors"]] == ["Fz_amplitude"]
+
+
+def test_a_column_of_amplitudes_of_another_direction_is_refused(
+    client: Any, problem: Callable[[Any, int], Any]
+) -> None:
+    columns = {**SPRING, "k": 1e6, "v0": [0.01, 0.01], "Fz_amplitude": [3.0, 3.0]}
+    (fault,) = problem(client.post(BATCH, json=columns), 422)["errors"]
+    assert (fault["field"], fault["value"]) == ("Fz_amplitude", "a list")
 
 
 @pytest.mark.parametrize("name", ["contact", "direction"])

@@ -116,7 +116,7 @@ class Answer(Result, Generic[Number]):
         self._plain: tuple[Kind, tuple[str, ...], tuple[Any, ...]]
         self._surrogate = surrogate
         self.gradient = self.gradient_bound = None
-        self.outputs: Mapping[str, Any] = _NOTHING
+        self.outputs: dict[str, Any] = _NOTHING
         #: where an output is missing or doubtful
         self.notes_on_outputs: list[Note] = []
 
@@ -296,7 +296,7 @@ class Answer(Result, Generic[Number]):
         >>> answer.to_frame()["regime"].tolist()
         ['static', 'stick_slip']
         """
-        return {path: self[path] for path in self.paths}
+        return {path: getattr(self, path) for path in self._always} | self.outputs
 
     def _members(self) -> dict[str, Any]:
         """Return the JSON of one case: ``power.saved`` is ``saved`` within ``power``.

@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mumacro.inputs.cases import KIND
-from service import forms, json_text
+from service import batch
+from service import rows as rows_of
 from service.problems import RequestError
 from tests.support.serving import CASE
 
@@ -43,12 +44,12 @@ def outcome(text: str, fast: bool = True, piece: int = 20) -> Any:
     """What is read of a body, by the fast readers where they can, in pieces of so many bytes, or
     never by them; None where it is refused."""
     with ExitStack() as stack:
-        stack.enter_context(patch.object(json_text, "_PIECE", piece))
+        stack.enter_context(patch.object(rows_of, "_PIECE", piece))
         if not fast:
             for name in ("decode_columns", "decode_rows"):
-                stack.enter_context(patch.object(forms, name, side_effect=ValueError))
+                stack.enter_context(patch.object(batch, name, side_effect=ValueError))
         try:
-            body = forms.read(bytearray(text.encode()), 1000, {})
+            body = batch.read(bytearray(text.encode()), 1000, {})
         except RequestError:
             return None
     return {name: plain(value) for name, value in body.members.items()}
@@ -73,7 +74,7 @@ def test_rows_are_read_as_json_reads_them(
 
 @pytest.mark.parametrize("row", [{"k": 1.0, "contact": "spring"}, dict.fromkeys(KIND, "along")])
 def test_rows_that_are_mostly_words_get_a_reason(row: dict[str, Any]) -> None:
-    body = forms.read(bytearray(json.dumps([row] * 2).encode()), 10, {})
+    body = batch.read(bytearray(json.dumps([row] * 2).encode()), 10, {})
     assert body.reasons[0] == body.reasons[1] == ("mu0", "is required")
 
 
@@ -92,7 +93,7 @@ def test_no_escape_in_a_name_hides_a_value_that_is_no_number(name: str, value: s
     case = {name: 1.0 for name in CASE if name != "y0"}
     text = json.dumps([{**case, "Fz_amplitude": 0.5}] * 3)
     text = text.replace("Fz_amplitude", name).replace("0.5", value)
-    body = forms.read(bytearray(text.encode()), 10, {"direction": "normal"})
+    body = batch.read(bytearray(text.encode()), 10, {"direction": "normal"})
     assert plain(body.members["Fz_amplitude"]) == ["NaN"] * 3
 
 
