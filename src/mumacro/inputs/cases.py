@@ -47,7 +47,7 @@ from mumacro.inputs.fields import (
 from mumacro.inputs.names import in_place_of, split_unit, suggestion
 from mumacro.inputs.numbers import check_signs
 from mumacro.inputs.units import scale_of
-from mumacro.kernel.arrays import Array, Places, flat
+from mumacro.kernel.arrays import Array, flat
 
 
 class Absent(enum.Enum):
@@ -151,15 +151,15 @@ class Cases(NamedTuple):
         """Return the number of cases."""
         return math.prod(self.shape)
 
-    def part(self, which: slice | Places) -> "Cases":
+    def part(self, which: slice) -> "Cases":
         """Return some of many cases, (m,)."""
 
         def cut(x: Any) -> Any:
             return x[which] if isinstance(x, np.ndarray) else x
 
-        places = range(self.size)[which] if isinstance(which, slice) else which.tolist()
+        places = range(self.size)[which]
         faults = {
-            name: {new: gaps[old] for new, old in enumerate(places) if old in gaps}
+            name: {places.index(place): gap for place, gap in gaps.items() if place in places}
             for name, gaps in self.faults.items()
         }
         return self._replace(
@@ -527,17 +527,19 @@ def _understood(name: str, value: Any, gaps: _Gaps) -> Value:
     return Value(column.si, unit=column.unit)
 
 
-def _by_case(gaps: _Gaps, shape: tuple[int, ...], strict: bool) -> dict[str, dict[int, Fault]]:
+def _by_case(gaps: _Gaps, shape: tuple[int, ...], strict: bool) -> dict[str, Mapping[int, Fault]]:
     """Return the gaps of columns by the cases that they affect.  If ``strict``, raise InputError
     for the first gap."""
-    faults = {}
+    faults: dict[str, Mapping[int, Fault]] = {}
     for name, (column, of_column) in gaps.items():
-        places = np.broadcast_to(np.arange(column.si.size).reshape(of_column), shape).ravel()
-        faults[name] = {
-            case: column.faults[place]
-            for case, place in enumerate(places.tolist())
-            if place in column.faults
-        }
+        faults[name] = column.faults
+        if of_column != shape:
+            places = np.broadcast_to(np.arange(column.si.size).reshape(of_column), shape).ravel()
+            faults[name] = {
+                case: column.faults[place]
+                for case, place in enumerate(places.tolist())
+                if place in column.faults
+            }
         if strict:
             refuse_gaps(name, column._replace(faults=faults[name]))
     return faults
@@ -607,10 +609,13 @@ def _deviations(
 def _refuse_other_amplitude(values: Mapping[str, Any], kind: Kind) -> None:
     """Raise InputError for the amplitude of another direction, unless its column is empty."""
     name = kind.other_amplitude
-    if name in values and (
-        values[name] is None or not np.isnan(_understood(name, values[name], {}).si).all()
-    ):
-        raise other_amplitude(name, values[name], kind)
+    if name not in values:
+        return
+    value, gaps = values[name], dict[str, Any]()
+    is_empty = value is not None and np.isnan(_understood(name, value, gaps).si).all()
+    unread = (fault.entry for column, _ in gaps.values() for fault in column.faults.values())
+    if not is_empty or any(entry is not None for entry in unread):
+        raise other_amplitude(name, value, kind)
 
 
 def other_amplitude(name: str, value: Any, kind: Kind) -> InputError:
