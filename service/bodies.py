@@ -7,8 +7,7 @@ parameter that occurs twice, reads numbers in a query as people type them, and k
 
 import asyncio
 import string
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterable, Mapping
-from contextlib import asynccontextmanager
+from collections.abc import Awaitable, Callable, Coroutine, Iterable, Mapping
 from functools import partial
 from typing import Any, TypeVar
 from urllib.parse import parse_qsl
@@ -31,7 +30,7 @@ JSON = b"application/json"
 SMALL_BODY = 64 * 1024  # largest body of a question, in bytes
 AT_ONCE = 16 * 1024  # largest body that is checked without a thread, in bytes
 _BYTES_PER_UNIT = 1.0  # bytes of such a body whose check has the cost 1, see service/admission.py
-_CHARSETS = ("utf-8", "utf8", "us-ascii", "")  # US-ASCII is a part of UTF-8
+_UTF_8 = {"utf-8", "utf8", "us-ascii", ""}  # US-ASCII is a part of UTF-8
 # the characters of a query that needs no decoding
 _PLAIN = f"{string.ascii_letters}{string.digits}.-_,=&".encode()
 _LISTS = frozenset(("include",))
@@ -40,27 +39,13 @@ _LISTS = frozenset(("include",))
 # --- time -----------------------------------------------------------------------------------------
 
 
-async def from_client(move: Awaitable[T], limit: int) -> T:
-    """Wait until the client sends or reads."""
+async def within(limit: int, move: Awaitable[T], kind: ProblemKind = ProblemKind.SLOW_CLIENT) -> T:
+    """Wait until the client sends or reads, or until another move has ended, up to a limit."""
     try:
         async with asyncio.timeout(limit):
             return await move
     except TimeoutError:
-        raise _late(ProblemKind.SLOW_CLIENT, limit) from None
-
-
-@asynccontextmanager
-async def within(limit: int) -> AsyncIterator[None]:
-    """Limit the time of a whole answer: its reading, computing and sending."""
-    try:
-        async with asyncio.timeout(limit):
-            yield
-    except TimeoutError:
-        raise _late(ProblemKind.TOOK_TOO_LONG, limit) from None
-
-
-def _late(kind: ProblemKind, limit: int) -> RequestError:
-    return RequestError(kind, f"this may take up to {limit} s")
+        raise RequestError(kind, f"this may take up to {limit} s") from None
 
 
 # --- bodies ---------------------------------------------------------------------------------------
@@ -70,8 +55,10 @@ def only_json(headers: Mapping[bytes, bytes], remedy: str = "") -> None:
     """Refuse a body that is compressed or is not JSON in UTF-8.  A body without Content-Type counts
     as JSON."""
     media_type = headers.get(b"content-type", JSON).lower()
-    media, _, parameters = media_type.decode("latin-1").partition(";")
-    if media.strip().encode() != JSON or not _is_utf8(parameters):
+    media, *parameters = media_type.decode("latin-1").split(";")
+    pairs = (parameter.partition("=") for parameter in parameters)
+    charsets = {value.strip(' \t"') for name, _, value in pairs if name.strip() == "charset"}
+    if media.strip().encode() != JSON or charsets - _UTF_8:
         text = media_type[:80].decode("latin-1")
         detail = f"send {JSON.decode()}, not {text}{remedy and f'; {remedy}'}"
         raise RequestError(
@@ -82,18 +69,6 @@ def only_json(headers: Mapping[bytes, bytes], remedy: str = "") -> None:
         raise RequestError(
             ProblemKind.UNSUPPORTED_BODY, detail, headers={"Accept-Encoding": "identity"}
         )
-
-
-def _is_utf8(parameters: str) -> bool:
-    """Return whether the parameters of a media type name no character set other than UTF-8.
-
-    >>> _is_utf8('version=1; charset="UTF-8"'.lower()), _is_utf8("charset=latin-1")
-    (True, False)
-    """
-    pairs = (parameter.partition("=") for parameter in parameters.split(";"))
-    return all(
-        value.strip(' \t"') in _CHARSETS for name, _, value in pairs if name.strip() == "charset"
-    )
 
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
@@ -149,7 +124,7 @@ async def small_body(request: Request) -> bytes:
     if ABORT in request.scope.get("state", ()):  # our own server limits this wait (server.py)
         body = bytes(await receiving)
     else:
-        body = bytes(await from_client(receiving, settings.client_timeout_s))
+        body = bytes(await within(settings.client_timeout_s, receiving))
     query = request.scope["query_string"]
     if query and (pairs := _pairs(query)):
         refuse(

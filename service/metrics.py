@@ -175,15 +175,15 @@ class Metrics:
         count()
         observe(seconds)
 
-    def case(self, table: LoadedTable, source: int, number: int = 1) -> None:
-        """Count answered cases of one source code; -1 means bad cases."""
-        self._of_source(table.id, source).inc(number)
+    def case(self, table: LoadedTable, source: int) -> None:
+        """Count one answered case by its source code."""
+        self._of_source(table.id, source).inc()
 
     def cases(self, table: LoadedTable, source: Any) -> None:
         """Count the cases of a batch by their source codes, including bad ones."""
         for code, number in enumerate(np.bincount(source + 1).tolist()):
             if number:
-                self.case(table, code - 1, number)
+                self._of_source(table.id, code - 1).inc(number)
 
     def now(self, **values: float) -> None:
         """Set present values, by the names of :data:`NOW`."""

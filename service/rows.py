@@ -83,7 +83,7 @@ def decode_rows(text: bytearray, query: Mapping[str, Any]) -> dict[str, Any]:
         for name, column in words.items():
             column.extend(map(attrgetter(name), rows))
     kind = (words[name][0] if name in words else None for name in KIND)
-    if isinstance(_targets_of(query, names, *kind), Reason):
+    if isinstance(_numbers_of(query, names, *kind), Reason):
         raise ValueError("the names form no case")
     columns = np.empty((len(numbers), sum(part.shape[1] for part in parts)))
     np.concatenate(parts, axis=1, out=columns)
@@ -153,11 +153,11 @@ def read_one_by_one(
     usual = {name: query.get(name, word) for name, word in SPRING.names.items()}
     used = set[str]()
     words_of: dict[str, dict[str, None]] = {name: {} for name in KIND if name not in query}
-    targets_of = lru_cache(maxsize=64)(partial(_targets_of, query))
+    numbers_of = lru_cache(maxsize=64)(partial(_numbers_of, query))
     reasons: dict[int, Reason] = {}
     for i, row in enumerate(rows):
         look()
-        numbers = _numbers_in(row, targets_of)
+        numbers = _numbers_in(row, numbers_of)
         if isinstance(numbers, Reason):
             if len(reasons) < MAX_REASONS:
                 name, text = numbers
@@ -183,15 +183,11 @@ def read_one_by_one(
     return members, reasons
 
 
-#: by the name of a row's member: the column of its value, and the scale of its unit there
-_Targets = dict[str, tuple[str, float]]
-
-
-def _targets_of(
+def _numbers_of(
     query: Mapping[str, Any], names: tuple[str, ...], contact: str | None, direction: str | None
-) -> _Targets | Reason:
-    """Return the columns for the numbers of a row with these names, or the reason why the names do
-    not form a case."""
+) -> list[str] | Reason:
+    """Return the names of numbers in a row with these names, in the order of the description, or
+    the reason why the names do not form a case."""
     known = Case.model_fields
     for name in names:
         if name not in known:
@@ -203,21 +199,26 @@ def _targets_of(
     numbers = [name for name in known if name in names and name not in KIND]
     case: dict[str, Any] = {name: 0.5 if name == AMPLITUDE else 1.0 for name in numbers}
     case |= {name: x for name, x in zip(KIND, (contact, direction), strict=True) if x is not None}
-    targets = {}
     try:
         if twice := case.keys() & query.keys():
             raise InputError(min(twice), None, "left out: it is given in the query")
         Cases.of({**query, **case})
     except InputError as error:
         return Reason(error.field or None, reason_of(error))
-    for name in numbers:
-        field, unit = field_of(DEVIATIONS.get(name, name))
-        targets[name] = (f"std_{field}" if name in DEVIATIONS else field), unit
-    return targets
+    return numbers
+
+
+# the column of a number, and the scale of its unit there
+_COLUMN_OF = {name: field_of(name) for name in INPUTS}
+_COLUMN_OF |= {
+    f"std_{name}": (f"std_{field}", unit)
+    for name, (field, unit) in _COLUMN_OF.items()
+    if f"std_{name}" in DEVIATIONS
+}
 
 
 def _numbers_in(
-    row: Any, targets_of: Callable[..., _Targets | Reason]
+    row: Any, numbers_of: Callable[..., list[str] | Reason]
 ) -> dict[str, float] | Reason:
     """Return the numbers of a row by column, or the first fault of its names and numbers."""
     if not isinstance(row, dict):
@@ -225,17 +226,18 @@ def _numbers_in(
     if None in row.values():  # a null means left out, except in k, where it may mean rigid
         row = {name: x for name, x in row.items() if x is not None or name == "k"}
     kind = (x if x is None or isinstance(x, str) else "" for x in map(row.get, KIND))
-    targets = targets_of(tuple(row), *kind)
-    if isinstance(targets, Reason):
-        if not targets.text:  # an unknown name
-            return targets
+    names = numbers_of(tuple(row), *kind)
+    if isinstance(names, Reason):
+        if not names.text:  # an unknown name
+            return names
         # as for one case, a bad value is told before a fault between names
         reasons = ((name, entry(name, x)[1]) for name, x in row.items() if name in NUMBERS)
-        return next((Reason(name, text) for name, text in reasons if text), targets)
+        return next((Reason(name, text) for name, text in reasons if text), names)
     numbers = {}
-    for name, (column, unit) in targets.items():
+    for name in names:
         number, reason = entry(name, row[name])
         if reason is not None:
             return Reason(name, reason)
+        column, unit = _COLUMN_OF[name]
         numbers[column] = unit * number
     return numbers

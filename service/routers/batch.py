@@ -20,7 +20,7 @@ from mumacro.kernel.stopping import look
 
 from ..admission import AT_ONCE, LONG, Ticket, ticket_of
 from ..batch import MORE_CASES, Batch, costs_of_reading
-from ..bodies import JSON, from_client, only_json, read_body, within
+from ..bodies import JSON, only_json, read_body, within
 from ..models.inputs import EXAMPLE
 from ..models.options import BatchOptions
 from ..problems import TICKET, ProblemKind, RequestError
@@ -45,6 +45,10 @@ class _Answer(Response):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer within the time limit."""
+        limit = self._state.settings.time_limit_s
+        await within(limit, self._answer(scope, receive, send), ProblemKind.TOOK_TOO_LONG)
+
+    async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         state, settings = self._state, self._state.settings
         patience, fields = settings.client_timeout_s, dict[bytes, bytes](scope["headers"])
 
@@ -53,38 +57,36 @@ class _Answer(Response):
             request."""
             return work() if cost <= AT_ONCE else await ticket_of(scope).run(work, cost, receive)
 
-        async with within(settings.time_limit_s):
-            only_json(fields, f"for more cases than a batch may have {MORE_CASES}")
-            reading = read_body(fields, receive, settings.max_body_bytes, scope)
-            text = await from_client(reading, patience)
-            if not text:
-                raise RequestError(ProblemKind.MALFORMED_BODY, "the body is empty")
-            # The cost of reading depends on the bytes, that of computing on the cases: a small body
-            # can request much computation.
-            cost, of_reading = costs_of_reading(text, LONG)
-            most, count = settings.max_batch, state.metrics.cases
-            work = partial(Batch.of, text, self._query, state.tables, most, count)
-            batch = await run(
-                work if of_reading <= AT_ONCE else partial(_in_turn, work), of_reading
-            )
-            held: Ticket | None = scope.get(TICKET)
-            if held:
-                held.hold(0)  # the text is gone
-            cost += batch.cost
-            # HTTP/1.0 has no answer in pieces
-            pieces = batch.write(math.inf if scope["http_version"] == "1.0" else _PIECE)
-            piece, following = await run(lambda: (next(pieces), next(pieces, None)), cost)
-            headers = [(b"content-type", JSON), (b"x-table", batch.table.id.encode("latin-1"))]
-            if following is None:
-                headers.append((b"content-length", b"%d" % len(piece)))
-            await send({"type": "http.response.start", "status": 200, "headers": headers})
-            while following is not None:
-                message = {"type": "http.response.body", "body": piece, "more_body": True}
-                await from_client(send(message), patience)
-                piece, following = following, await run(lambda: next(pieces, None), cost)
-            if held := scope.get(TICKET):
-                held.leave()
-            await from_client(send({"type": "http.response.body", "body": piece}), patience)
+        only_json(fields, f"for more cases than a batch may have {MORE_CASES}")
+        text = await within(patience, read_body(fields, receive, settings.max_body_bytes, scope))
+        if not text:
+            raise RequestError(ProblemKind.MALFORMED_BODY, "the body is empty")
+        # The cost of reading depends on the bytes, that of computing on the cases: a small body can
+        # request much computation.
+        cost, of_reading = costs_of_reading(text, LONG)
+        most, count = settings.max_batch, state.metrics.cases
+        work = partial(Batch.of, text, self._query, state.tables, most, count)
+        if of_reading > AT_ONCE:
+            work = partial(_in_turn, work)
+        batch = await run(work, of_reading)
+        held: Ticket | None = scope.get(TICKET)
+        if held:
+            held.hold(0)  # the text is gone
+        cost += batch.cost
+        # HTTP/1.0 has no answer in pieces
+        pieces = batch.write(math.inf if scope["http_version"] == "1.0" else _PIECE)
+        piece, following = await run(lambda: (next(pieces), next(pieces, None)), cost)
+        headers = [(b"content-type", JSON), (b"x-table", batch.table.id.encode("latin-1"))]
+        if following is None:
+            headers.append((b"content-length", b"%d" % len(piece)))
+        await send({"type": "http.response.start", "status": 200, "headers": headers})
+        while following is not None:
+            message = {"type": "http.response.body", "body": piece, "more_body": True}
+            await within(patience, send(message))
+            piece, following = following, await run(lambda: next(pieces, None), cost)
+        if held := scope.get(TICKET):
+            held.leave()
+        await within(patience, send({"type": "http.response.body", "body": piece}))
 
 
 def _in_turn(work: Callable[[], T]) -> T:

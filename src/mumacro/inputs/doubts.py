@@ -80,7 +80,8 @@ def remarks(
     by_field: dict[str, Note] = {}
     has_reason: Bools = np.zeros(shape, np.bool_)
     with np.errstate(all="ignore"):
-        for field, where in (*_out_of_range(six), *_groups_out_of_range(six)):
+        oscillates = ((six["y0"] > 0.0) | (six["Fz_amplitude"] > 0.0)) & (six["omega"] > 0.0)
+        for field, where in _outside(six, oscillates):
             new = np.asarray(where & ~has_reason)  # one reason for each case
             if not new.any():
                 continue
@@ -95,7 +96,7 @@ def remarks(
             else:
                 by_field[name] = Note(REMARK, text, UNITS, name, cases=cases)
         still = _of_still(six, frequency)
-        rigid = np.asarray(np.isposinf(six["k"]) & _oscillates(six))
+        rigid = np.asarray(np.isposinf(six["k"]) & oscillates)
         if not rigid.any():
             return [*by_field.values(), *still]
         stiffest = float(np.fmax.reduce((six["mu0"] * six["Fz"] / six["y0"])[rigid]))
@@ -188,30 +189,23 @@ def _usual(columns: Mapping[str, Any]) -> bool:
     )
 
 
-def _out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
-    """Yield every input with the cases in which it is outside its usual range.  A rigid contact, a
-    legal zero and an illegal value are not outside."""
+def _outside(six: Mapping[str, Array], oscillates: Bools) -> Iterator[tuple[str, Bools]]:
+    """Yield every input with the cases in which it is outside its usual range, then l0, y~, v~ and
+    the peak speed with the legal contacts for which no contact has such a value.
+
+    A rigid contact, a legal zero and an illegal value are not outside.
+    """
     for name, (least, most) in _USUAL.items():
         column = six[name]
-        outside = ((column < least) | (column > most)) & np.isfinite(column) & (column > 0.0)
-        yield name, outside
-
-
-def _groups_out_of_range(six: Mapping[str, Array]) -> Iterator[tuple[str, Bools]]:
-    """Yield l0, y~, v~ and the peak speed with the legal contacts for which no contact has such a
-    value."""
+        yield name, ((column < least) | (column > most)) & np.isfinite(column) & (column > 0.0)
     length = six["mu0"] * six["Fz"] / six["k"]
     elastic = (length > 0.0) & (six["Fz"] > 0.0) & (six["k"] > 0.0)
-    moves = _oscillates(six) & elastic
-    yield "l0", np.asarray((length > LONGEST) & elastic)
-    yield "y~", np.asarray((six["y0"] / length > FURTHEST) & moves)
-    yield "v~", np.asarray((six["v0"] / six["omega"] / length > FURTHEST) & moves)
+    moves = oscillates & elastic
+    yield "l0", (length > LONGEST) & elastic
+    yield "y~", (six["y0"] / length > FURTHEST) & moves
+    yield "v~", (six["v0"] / six["omega"] / length > FURTHEST) & moves
     speed = six["y0"] * six["omega"]
-    yield "y0 omega", np.asarray((speed > FASTEST) & np.isfinite(speed))
-
-
-def _oscillates(six: Mapping[str, Array]) -> Bools:
-    return np.asarray(((six["y0"] > 0.0) | (six["Fz_amplitude"] > 0.0)) & (six["omega"] > 0.0))
+    yield "y0 omega", (speed > FASTEST) & np.isfinite(speed)
 
 
 def _sentence(
