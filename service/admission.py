@@ -337,7 +337,7 @@ def client_of(scope: Scope) -> str:
 
 
 def ticket_of(scope: Scope) -> Ticket:
-    """Return the ticket of a request; :class:`~service.problems.Failures` takes it back."""
+    """Return the ticket of a request; :class:`~service.middleware.Failures` takes it back."""
     ticket: Ticket | None = scope.get(TICKET)
     if ticket is None:
         ticket = scope[TICKET] = Ticket(scope)

@@ -28,16 +28,14 @@ from starlette.types import ASGIApp
 
 from . import __version__
 from .admission import Admission, Thread, threads_end
-from .bodies import Direct, HeadAsGet
 from .guide_pages import GuidePages
 from .metrics import Metrics
+from .middleware import HEALTH_PATHS, SCHEMES, Direct, Entrance, Failures, HeadAsGet, Keys
 from .models.answers import CaseAnswer, ColumnsAnswer, Problem, RowsAnswer
 from .models.inputs import without_null
 from .models.options import Case, CaseColumns, CaseRequest
 from .observe import LogLines, Observe, Observer
-from .problems import Failures
 from .routers import batch, case, contact, health, motion, page, questions, table
-from .security import HEALTH_PATHS, SCHEMES, Entrance, Keys
 from .settings import Settings, load_settings, unknown_variables
 from .tables import Tables
 

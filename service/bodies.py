@@ -7,7 +7,7 @@ parameter that occurs twice, reads numbers in a query as people type them, and k
 
 import asyncio
 import string
-from collections.abc import Awaitable, Callable, Coroutine, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Coroutine, Mapping
 from functools import partial
 from typing import Any, TypeVar
 from urllib.parse import parse_qsl
@@ -16,12 +16,11 @@ from fastapi import Request, Response
 from fastapi.routing import APIRoute
 from pydantic import ValidationError
 from starlette.requests import ClientDisconnect
-from starlette.routing import BaseRoute
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import Receive, Scope
 
 from .admission import Ticket, compute, ticket_of
 from .json_text import decode
-from .problems import ABORT, FieldFault, ProblemKind, RequestError, invalid, path_in, refuse
+from .problems import ABORT, FieldFault, ProblemKind, RequestError, invalid, refuse
 from .understood import UNDERSTOOD, understood
 
 T = TypeVar("T")
@@ -226,50 +225,6 @@ class DirectRoute(APIRoute):
         if self.dependant.dependencies:
             raise TypeError(f"{self.path} has a dependency, which a DirectRoute does not solve")
         return of_body if in_body else of_query
-
-
-class HeadAsGet:
-    """Answer HEAD as GET, without the body (middleware)."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer one request."""
-        if scope["type"] != "http" or scope["method"] != "HEAD":
-            await self._app(scope, receive, send)
-            return
-
-        async def send_head(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                await send(message)
-                # at once, because the client may already send its next request
-                await send({"type": "http.response.body", "body": b""})
-
-        await self._app({**scope, "method": "GET"}, receive, send_head)
-
-
-class Direct:
-    """Send a request for a :class:`DirectRoute` directly to its handler (middleware).  All other
-    requests, and other methods, go to the router."""
-
-    def __init__(self, app: ASGIApp, routes: Iterable[BaseRoute]) -> None:
-        self._app = app
-        self._handlers = {
-            (method, route.path): route.get_route_handler()
-            for route in routes
-            if isinstance(route, DirectRoute)
-            for method in route.methods or ()
-        }
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer one request."""
-        handler = scope["type"] == "http" and self._handlers.get((scope["method"], path_in(scope)))
-        if not handler:
-            await self._app(scope, receive, send)
-            return
-        answer = await handler(Request(scope, receive))
-        await answer(scope, receive, send)
 
 
 def of_members(model: Any, members: Mapping[str, Any]) -> Any:

@@ -22,8 +22,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from .metrics import Metrics
+from .middleware import HEALTH_PATHS, NOSNIFF
 from .problems import ABORT, REFUSED, STATUS, meaning, path_in
-from .security import HEALTH_PATHS, NOSNIFF
 
 _GONE = 499  # the usual status for a client that disconnected before the answer
 _ID = re.compile(rb"[A-Za-z0-9._:-]{1,128}")  # an id goes into a header and into logs

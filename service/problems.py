@@ -7,7 +7,6 @@ reported at once.  A user never sees a traceback.
 """
 
 import json
-import logging
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,9 +18,8 @@ import numpy as np
 import orjson
 from pydantic import BaseModel, ValidationError
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect
 from starlette.responses import Response
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import Scope
 
 from mumacro.errors import InputError, MumacroError, TableError
 from mumacro.inputs.case import no_number
@@ -38,7 +36,6 @@ _NO_VALUE = object()
 CLOSE = {"Connection": "close"}
 # the members of the objects within a body
 _WITHIN = dict.fromkeys(PARTS, ("harmonic", "amplitude", "phase"))
-_log = logging.getLogger("mumacro.error")
 
 
 @dataclass(frozen=True)
@@ -428,42 +425,3 @@ def problem_of(error: RequestError, scope: Scope) -> Response:
     return Response(
         content, error.kind.status, headers=headers, media_type="application/problem+json"
     )
-
-
-class Failures:
-    """Convert every exception to a problem document (middleware), and give back what the request
-    holds.  An unexpected exception goes to the log."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer one request."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
-        try:
-            await self._app(scope, receive, send)
-        except ClientDisconnect:
-            raise
-        except Exception as error:
-            _log_unexpected(error, scope)
-            # an answer that has begun ends with its connection, without its end
-            if STATUS in scope["state"]:
-                raise ClientDisconnect from error
-            try:
-                answer = problem_of(meaning(error, scope), scope)
-            except Exception as fault:  # such as a detail that JSON cannot hold
-                _log_unexpected(fault, scope)
-                answer = problem_of(meaning(fault, scope), scope)
-            await answer(scope, receive, send)
-        finally:
-            if ticket := scope.get(TICKET):
-                ticket.hold(0)
-                ticket.leave()
-
-
-def _log_unexpected(error: Exception, scope: Scope) -> None:
-    if meaning(error, scope).kind is ProblemKind.UNEXPECTED:
-        fields = {"request_id": scope.get("request_id"), "path": scope["path"]}
-        _log.error("unexpected error", exc_info=error, extra={"fields": fields})

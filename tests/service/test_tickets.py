@@ -11,8 +11,8 @@ from starlette.types import Message, Receive, Scope, Send
 
 from service.admission import Admission, Ticket
 from service.bodies import read_body
+from service.middleware import HEALTH_PATHS, Entrance
 from service.problems import FULL, RequestError
-from service.security import HEALTH_PATHS, Entrance
 from tests.support.admitting import run, scope_of
 from tests.support.serving import CASE
 
