@@ -11,7 +11,7 @@ from fastapi import Query, Request, Response
 import mumacro
 from mumacro.errors import InputError
 from mumacro.inputs.case import read_one
-from mumacro.inputs.cases import Cases, ends_in, named
+from mumacro.inputs.cases import Cases
 from mumacro.inputs.stiffening import Stiffening
 from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
@@ -85,7 +85,7 @@ def _answer_at(
     if stiffening is not None:
         stiffnesses = stiffening.scaled(question.inputs, values)
         inputs = {name: value for name, value in inputs.items() if name != "k"} | stiffnesses
-    cases = Cases.of(named(None, inputs | question.words | question.deviations))
+    cases = Cases.of(inputs | question.words | question.deviations)
     return table.surrogate.answer(cases, chosen(question.outputs, cases))
 
 
@@ -223,8 +223,8 @@ def _solved(question: SolveForRequest, tables: Tables) -> dict[str, Any]:
     included = iter(_included(question, table, name, solution))
     for result in answer["results"]:
         result["roots"] = [root | next(included) for root in result["roots"]]
-    for k, end in zip(ends_in(case) or (), answer.get("ends", ()), strict=True):
-        end |= {"k": k, **_in_quantity(question, end, unit)}
+    for one, end in zip(solution.ends or (), answer.get("ends", ()), strict=True):
+        end |= {"k": one.curve.case["k"], **_in_quantity(question, end, unit)}
     answer |= {"quantity": question.quantity}
     return {**answer, **table.signature}
 

@@ -8,6 +8,7 @@ xarray and Dask; afterwards it adds them again.
 
 import enum
 import math
+import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple
 
@@ -365,39 +366,34 @@ def has_labels(values: Iterable[Any]) -> bool:
     return not types <= _UNLABELLED and any(map(library_of, values))
 
 
-def fixed_inputs(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> dict[str, float]:
-    """Return the inputs of one case except the unknown or swept one, by the names of
-    ``kind.fields``; an infinite ``k`` is rigid.
+def case_around(case: Mapping[str, Any], unknown: str, kind: Kind = SPRING) -> Cases:
+    """Return one case without its unknown or swept input, in whose place a legal number stands.
 
-    ``f`` may replace ``omega``; inputs that are None are left out.  Raise InputError if one of the
-    five is missing or is not one legal number, or if the unknown has a value.
+    Inputs that are None are left out.  Raise InputError if one of the five others is missing or is
+    not one legal number, or if the unknown has a value or a deviation.
     """
     if unknown not in kind.columns:
         raise InputError("unknown", unknown, f"one of {', '.join(kind.columns)}")
-    field = field_of(unknown)[0]
-    for name in ENDS:
-        if case.get(name) is not None:
-            bound = (
-                "left out: over an interval of k a target has an interval of roots; solve for "
-                "both ends of it"
-            )
-            raise InputError(name, case[name], bound)
-    for name in case.keys() & DEVIATIONS.keys():
-        raise InputError(name, case[name], NO_DEVIATION)
-    for name in case.keys() - {*kind.columns, *AMPLITUDES, *ENDS}:
+    for name in case.keys() - {*kind.columns, *AMPLITUDES, *ENDS, *DEVIATIONS}:
         raise no_such_input(name, case[name], kind.columns)
     inputs = {
         name: value for name, value in case.items() if value is not None or name == "k" != unknown
     }
-    for name in inputs.keys() & ({"omega", "f"} if field == "omega" else {field}):
-        raise InputError(name, inputs[name], f"left out, because {unknown} is the unknown or swept")
-    columns = columns_of({**inputs, field: 1.0}, kind)
-    for name, column in columns.items():
-        if np.size(column) != 1:
-            raise InputError(name, inputs.get(name, inputs.get("f")), "one number")
-    del columns[field]
-    check(columns, inputs.get("f"))
-    return {name: float(np.ravel(column)[0]) for name, column in columns.items()}
+    field = field_of(unknown)[0]
+    for name in inputs:
+        if field_of(name)[0] == field:
+            bound = f"left out, because {unknown} is the unknown or swept"
+            raise InputError(name, inputs[name], bound)
+        if name in ENDS and field == "k":
+            raise InputError(name, inputs[name], "left out where k is the swept input")
+        if name in DEVIATIONS and field_of(DEVIATIONS[name])[0] == field:
+            raise InputError(name, inputs[name], "left out: a sweep is over exact values")
+    legal = {AMPLITUDE: 0.0, "Fz": sys.float_info.max}.get(field, 1.0)
+    cases = Cases.of({**inputs, field: legal}, kind, strict=True)
+    if cases.size != 1:
+        name = next(name for name in inputs if is_column(inputs[name]))
+        raise InputError(name, inputs[name], "one number")
+    return cases
 
 
 # --- an interval of k -----------------------------------------------------------------------------
@@ -454,26 +450,6 @@ def middle(low: Any, high: Any) -> float | Array:
     lower, upper = (np.where(legal, end, math.nan) for end in (low, high))
     inside = np.clip(np.sqrt(lower) * np.sqrt(upper), lower, upper)
     return inside if inside.ndim else float(inside)
-
-
-def without_interval(
-    case: Mapping[str, Any], along: str = ""
-) -> tuple[Mapping[str, Any], dict[str, Any]]:
-    """Return a case with the middle of an interval of k, and the two ends; no ends if it has one k.
-
-    Raise InputError for an interval if k itself is swept.
-    """
-    inputs = {name: value for name, value in case.items() if value is not None or name == "k"}
-    ends = ends_in(inputs)
-    if ends is None and isinstance(inputs.get("k"), str):
-        k = read("k", inputs["k"])
-        ends = None if k.low is None else (k.low, k.high)
-    if ends is None:
-        return case, {}
-    if along == "k":
-        raise InputError("k_low", ends[0], "left out where k is the swept input")
-    rest = {name: x for name, x in inputs.items() if name not in ENDS}
-    return {**rest, "k": middle(*ends)}, dict(zip(ENDS, ends, strict=True))
 
 
 # --- from values to numbers -----------------------------------------------------------------------

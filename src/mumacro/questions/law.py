@@ -11,9 +11,9 @@ import numpy as np
 
 from mumacro import plotting
 from mumacro.errors import InputError
-from mumacro.inputs.case import read, read_one
-from mumacro.inputs.cases import DEVIATIONS, fixed_inputs, named, without_interval
-from mumacro.inputs.columns import is_column, to_si
+from mumacro.inputs.case import read_one
+from mumacro.inputs.cases import case_around
+from mumacro.inputs.columns import to_si
 from mumacro.inputs.fields import (
     AMPLITUDE,
     ENDS,
@@ -187,26 +187,6 @@ def _ascending(along: str, values: Any) -> Array:
     return x
 
 
-def _apart(case: Mapping[str, Any], swept: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the exact inputs of a case, and apart from them the deviations (std_k and so on)."""
-    inputs = named(None, {name: x for name, x in case.items() if x is not None or name == "k"})
-    deviations = {name: inputs.pop(name) for name in DEVIATIONS if name in inputs}
-    for name in inputs.keys() & QUANTITY_OF.keys():
-        if inputs[name] is None or is_column(inputs[name]):
-            continue
-        one = read(name, inputs[name])
-        if one.std is None:
-            continue
-        if f"std_{name}" in deviations:
-            raise InputError(f"std_{name}", deviations[f"std_{name}"], "given once")
-        inputs[name], deviations[f"std_{name}"] = one.si, one.std
-    for name in deviations:
-        if field_of(DEVIATIONS[name])[0] == swept:
-            bound = "left out: a sweep is over exact values"
-            raise InputError(name, deviations[name], bound)
-    return inputs, deviations
-
-
 @np.errstate(all="ignore")
 def law(
     surrogate: Surrogate,
@@ -275,23 +255,24 @@ def law(
         raise InputError("values", "an array", "left out beside start and stop")
     name, per = field_of(along)
     kind, x = kind_of(contact, direction), per * axis
-    case, deviations = _apart(case, name)
-    middle_case, ends = without_interval(case, name)
-    middle_case, stiffening = stiffening_of(middle_case, name, kind, stiffness_exponent)
-    inputs = fixed_inputs(middle_case, along, kind)
+    others, stiffening = stiffening_of(case, name, kind, stiffness_exponent)
+    one = case_around(others, along, kind)
+    inputs = {field: float(value) for field, value in one.columns.items() if field != name}
     curve = InputCurve(surrogate, inputs, name, kind, stiffening)
     border = border_crossings(curve, float(x[0]), float(x[-1]))
-    whole = curve
-    if ends:
-        interval = {**{name: value for name, value in inputs.items() if name != "k"}, **ends}
+    whole, k_ends = curve, None
+    if one.ends is not None:
+        k_ends = float(one.ends[0]), float(one.ends[1])
+        interval = {field: value for field, value in inputs.items() if field != "k"}
+        interval |= dict(zip(ENDS, k_ends, strict=True))
         whole = InputCurve(surrogate, interval, name, kind, stiffening)
-    if stiffening is not None and "std_k" in deviations:  # it grows in the same way as k
-        relative = read_one("std_k", deviations["std_k"]) / inputs["k"]
+    deviations: dict[str, Any] = {f"std_{field}": deviation for field, deviation in one.std.items()}
+    if stiffening is not None and "k" in one.std:  # it grows in the same way as k
+        relative = one.std["k"] / inputs["k"]
         deviations["std_k"] = stiffening.stiffness(inputs["k"], x) * relative
     cases = whole.cases(x, **deviations)
     answer = surrogate.answer(cases, chosen((), cases), groups=True)
     at_rest = curve.answer(x, v0=0.0) if name != "v0" else curve.answer(0.0)
     mu_static = np.broadcast_to(at_rest.mu_macro, x.shape)
-    k_ends = (float(ends[ENDS[0]]), float(ends[ENDS[1]])) if ends else None
     marks = tuple(replace(crossing, value=crossing.value / per) for crossing in border)
     return Law(along, axis, answer, mu_static, marks, inputs, kind, curve.stiffening, k_ends)

@@ -40,8 +40,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.case import read_one
-from mumacro.inputs.cases import fixed_inputs, real, without_interval
+from mumacro.inputs.case import NO_DEVIATION, read_one
+from mumacro.inputs.cases import DEVIATIONS, case_around, real
 from mumacro.inputs.fields import AMPLITUDE, POSITIVE, QUANTITY_OF, Numbers, field_of, kind_of
 from mumacro.inputs.stiffening import stiffening_of
 from mumacro.kernel.arrays import Array
@@ -203,9 +203,14 @@ def solve_for(
     """
     kind, (name, _) = kind_of(contact, direction), field_of(unknown)
     within = None if within is None else _ends(unknown, within)
-    inputs, interval = without_interval(case, name)
-    inputs, stiffening = stiffening_of(inputs, name, kind, stiffness_exponent)
-    fixed, levels = fixed_inputs(inputs, unknown, kind), _levels(target)
+    others, stiffening = stiffening_of(case, name, kind, stiffness_exponent)
+    for deviation in (name for name in DEVIATIONS if case.get(name) is not None):
+        raise InputError(deviation, case[deviation], NO_DEVIATION)
+    one, levels = case_around(others, unknown, kind), _levels(target)
+    for input_ in one.std:
+        written = "f" if input_ == "omega" and one.f is not None else input_
+        raise InputError(written, case[written], NO_DEVIATION)
+    fixed = {input_: float(x) for input_, x in one.columns.items() if input_ != name}
     words = {"contact": contact, "direction": direction, "stiffness_exponent": stiffness_exponent}
 
     def solved(**k: float) -> TableSolution:
@@ -213,9 +218,9 @@ def solve_for(
         return _solution_over(curve, unknown, levels, within, {**words, **case})
 
     middle = solved()
-    if not interval:
+    if one.ends is None:
         return middle
-    softest, stiffest = (solved(k=float(np.ravel(k)[0])) for k in interval.values())
+    softest, stiffest = (solved(k=float(k)) for k in one.ends)
     return replace(middle, ends=(softest, stiffest))
 
 

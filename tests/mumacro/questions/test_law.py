@@ -158,6 +158,8 @@ def test_the_articles_formulas_are_of_one_spring_across(surrogate: Surrogate, pa
         ("v0", {**LINE, **INTERVAL}, "across", "k"),
         ("v0", {**without(LINE, "k"), "k_low": 2e6, "k_high": 1e6}, "across", "k_low"),
         ("v0", {**without(LINE, "k"), "k_low": 1e6}, "across", "k_high"),
+        ("v0", {**without(LINE, "k"), "k_low": "1 ± 0.1 N/um", "k_high": 2e6}, "across", "k_low"),
+        ("v0", {**without(LINE, "k"), "k_low": [1e6, 1e6], "k_high": 2e6}, "across", "k_low"),
         ("v0", {**LINE, "step": 9}, "across", "step"),
         ("v0", {**LINE, "std_v0": 1e-3}, "across", "std_v0"),
         ("f", {**without(CASE, "omega"), "std_omega": 1.0}, "across", "std_omega"),
@@ -182,6 +184,11 @@ def test_a_bad_interval_is_named(
 ) -> None:
     with refused(place):
         friction_law(surrogate, along, values=[1.0, 10.0], **case, direction=direction)
+
+
+def test_the_ends_of_an_interval_may_stand_in_lists_of_one(surrogate: Surrogate) -> None:
+    case = {**without(LINE, "k"), "k_low": [1e6], "k_high": [2e6]}
+    assert friction_law(surrogate, values=SPEEDS, **case).k_ends == (1e6, 2e6)
 
 
 @pytest.mark.parametrize(
