@@ -196,8 +196,8 @@ class Batch:
         lengths = {name: n for name, n in lengths.items() if name in values.keys() - KIND}
         if len({*lengths.values()}) > 1:
             size = next(iter(lengths.values()))
-            text_of = ", ".join(f"{name}: {length}" for name, length in lengths.items())
-            reason = f"lists must have one length; given {text_of}"
+            sizes = ", ".join(f"{name}: {length}" for name, length in lengths.items())
+            reason = f"lists must have one length; given {sizes}"
             wrong = [name for name, length in lengths.items() if length != size]
             refuse([FieldFault.of(name, reason) for name in wrong])
         if not lengths and "v0" in values:  # otherwise it is refused below
@@ -210,16 +210,17 @@ class Batch:
 
     def write(self, least: float) -> Iterator[bytes]:
         """Yield the answer as JSON, in the form of the body and in pieces of at least this size."""
-        text = bytearray()
+        parts, size = list[bytes](), 0
         for part in self._as_rows() if self.rows else self._as_columns():
-            text += part
-            if len(text) >= least:
-                yield bytes(text)
-                text.clear()
+            parts.append(part)
+            size += len(part)
+            if size >= least:
+                yield b"".join(parts)
+                parts, size = [], 0
         end: dict[str, Any] = {"errors": self.errors, "n_errors": self.n_errors}
         if self.notes:
             end["remarks"] = [note.as_remark for note in self.notes]
-        yield bytes(text) + b"," + dump(end | self.table.signature)[1:]
+        yield b"".join([*parts, b",", dump(end | self.table.signature)[1:]])
 
     def _as_columns(self) -> Iterator[bytes]:
         """Yield an object of lists, without its closing brace."""
