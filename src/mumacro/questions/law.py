@@ -255,8 +255,8 @@ def law(
         raise InputError("values", "an array", "left out beside start and stop")
     name, per = field_of(along)
     kind, x = kind_of(contact, direction), per * axis
-    others, stiffening = stiffening_of(case, name, kind, stiffness_exponent)
-    one = case_around(others, along, kind)
+    remaining, stiffening = stiffening_of(case, name, kind, stiffness_exponent)
+    one = case_around(remaining, along, kind)
     inputs = {field: float(value) for field, value in one.columns.items() if field != name}
     curve = InputCurve(surrogate, inputs, name, kind, stiffening)
     border = border_crossings(curve, float(x[0]), float(x[-1]))

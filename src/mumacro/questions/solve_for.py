@@ -203,10 +203,10 @@ def solve_for(
     """
     kind, (name, _) = kind_of(contact, direction), field_of(unknown)
     within = None if within is None else _ends(unknown, within)
-    others, stiffening = stiffening_of(case, name, kind, stiffness_exponent)
+    remaining, stiffening = stiffening_of(case, name, kind, stiffness_exponent)
     for deviation in (name for name in DEVIATIONS if case.get(name) is not None):
         raise InputError(deviation, case[deviation], NO_DEVIATION)
-    one, levels = case_around(others, unknown, kind), _levels(target)
+    one, levels = case_around(remaining, unknown, kind), _levels(target)
     for input_ in one.std:
         written = "f" if input_ == "omega" and one.f is not None else input_
         raise InputError(written, case[written], NO_DEVIATION)
