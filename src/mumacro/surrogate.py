@@ -29,6 +29,7 @@ from mumacro.inputs.fields import (
     BALL,
     FIELDS,
     RAD_PER_CYCLE,
+    RIGID,
     SPRING,
     AnyCases,
     Kind,
@@ -63,6 +64,7 @@ _NUMBERS_OR_ARRAYS = NUMBERS | {np.ndarray}
 _SIMPLE = _NUMBERS_OR_ARRAYS | {str}
 _SIX_WITH_F = tuple("f" if name == "omega" else name for name in FIELDS)
 _OPTIONS: dict[str, Any] = {"include": (), "gradient": False, "illegal": "nan"}
+_ACROSS = (ABSENT, "across")
 _SHORT: dict[Any, Kind] = {ABSENT: SPRING, "spring": SPRING, "ball": BALL}
 _SLOPES = tuple(f"{name}.{field}" for name in ("gradient", "gradient_bound") for field in FIELDS)
 
@@ -603,11 +605,13 @@ class Surrogate:
         """
         if (
             cases is None
-            and k_low is k_high is Fz_amplitude is direction is ABSENT
+            and k_low is k_high is Fz_amplitude is ABSENT
             and std_mu0 is std_Fz is std_k is std_y0 is std_Fz_amplitude is ABSENT
             and std_omega is std_f is std_v0 is ABSENT
             and type(contact) in _WORDS
             and contact in _SHORT
+            and type(direction) in _WORDS
+            and direction in _ACROSS
             and (f is ABSENT or omega is ABSENT)
             and not unknown_names
             and type(gradient) is bool
@@ -617,10 +621,15 @@ class Surrogate:
             # Plain numbers take this short path in a third of the time; arrays of doubles take it,
             # too.  Cases that it cannot answer take the long path, which has the messages.
             names = FIELDS if f is ABSENT else _SIX_WITH_F
+            if type(k) is str and k == RIGID:
+                k = math.inf
             six = (mu0, Fz, k, y0, omega if f is ABSENT else f, v0)
             types = {*map(type, six)}
-            if types <= NUMBERS and not include and not (gradient and k == math.inf):
+            if types <= NUMBERS and not (gradient and k == math.inf):
                 with suppress(OverflowError):  # a whole number beyond double range
+                    if include:
+                        one = Cases.of_numbers(names, six, _SHORT[contact])
+                        return self.answer(one, chosen(include, one, gradient))
                     answer = self._one(names, six, gradient, _SHORT[contact])
                     if answer.source_code >= 0:
                         return answer

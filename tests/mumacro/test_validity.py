@@ -1,5 +1,7 @@
 """What an answer says about the model: rows of docs/validity.md, effects, digits."""
 
+import contextlib
+import io
 import math
 import re
 from pathlib import Path
@@ -9,7 +11,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate
-from mumacro.cli.one_case import run
+from mumacro.cli.main import main
 from mumacro.inputs.cases import Cases
 from mumacro.validity import ROWS, digits, effect_of, notes_of, rows_of
 from tests.support.cases import Case
@@ -82,19 +84,20 @@ def test_a_value_is_doubted_as_it_was_typed(surrogate: Surrogate, name: str, tex
     [remark] = surrogate.evaluate(**{**CASE, name: text}).remarks
     assert remark["field"] == name
     assert remark["text"].endswith(TYPED[name, text])
-    words = main_words(name, text)
+    words = printed({**CASE, name: text.replace(" ", "")})
     assert f"{name}: {remark['text']}" in words
 
 
-def main_words(name: str, text: str) -> str:
-    """What the command prints of the case with another input."""
-    case = {**CASE, name: text.replace(" ", "")}
-    return run([" ".join(f"{one}={value}" for one, value in case.items())], "")
+def printed(case: Case, *options: str) -> str:
+    """What the command prints of a case."""
+    with contextlib.redirect_stdout(io.StringIO()) as output:
+        assert main([" ".join(f"{name}={value}" for name, value in case.items()), *options]) == 0
+    return output.getvalue()
 
 
 @pytest.mark.parametrize("contact", ["spring", "ball"])
 def test_an_assumption_is_called_by_its_contact(surrogate: Surrogate, contact: str) -> None:
-    words = run([" ".join(f"{name}={x}" for name, x in CASE.items()), "--contact", contact], "")
+    words = printed(CASE, "--contact", contact)
     shown = repr(surrogate.evaluate(**CASE, contact=contact)._repr_html_())
     for text in (words, shown):
         assert ("one spring: a ball on a flat" in text) is (contact == "spring")
@@ -182,7 +185,7 @@ def test_a_stiffness_with_its_uncertainty_is_not_asked_for(surrogate: Surrogate,
     known: Any = surrogate.evaluate(CASE)
     assert "k is known" not in {row["row"] for row in rows_of(answer)}
     assert "k is known" in {row["row"] for row in rows_of(known)}
-    for text in (main_words("k", k), answer._repr_html_()):
+    for text in (printed({**CASE, "k": k.replace(" ", "")}), answer._repr_html_()):
         assert "k is known" not in text
         assert "one spring" in text
 

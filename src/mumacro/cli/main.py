@@ -13,14 +13,17 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from mumacro.cli import common, one_case
-from mumacro.cli.common import ImpossibleError, UsageError
+from mumacro import __version__
+from mumacro.cli import common
+from mumacro.cli.common import ImpossibleError, OneLineParser, UsageError
 from mumacro.errors import missing
-from mumacro.inputs.fields import NAMES
+from mumacro.inputs.fields import NAMES, kind_of
 from mumacro.table.bundled import bundled_tables
+from mumacro.validity import in_words, rows_of
 
+EXAMPLE = "mu0=0.3 Fz=10N k=1N/um y0=2um f=20kHz v0=10mm/s"
 _TASKS = {
-    f'mumacro "{one_case.EXAMPLE}"': "one case",
+    f'mumacro "{EXAMPLE}"': "one case",
     "mumacro eval cases.parquet -o out.parquet": "files: text, xlsx, parquet",
     'mumacro law "mu0=0.3 ..." --along v0 1mm/s 1m/s -o law.png': "mu_macro along one input",
     'mumacro solve-for y0 "mu0=0.3 ..." --target 0.15': "the input for a mu_macro",
@@ -102,7 +105,7 @@ def _first_steps() -> str:
     from mumacro.cli import law, solve_for
 
     return (
-        f'friction of one case:      mumacro "{one_case.EXAMPLE}"\n'
+        f'friction of one case:      mumacro "{EXAMPLE}"\n'
         f"friction along the speed:  {law.EXAMPLE}\n"
         f"which amplitude halves it: {solve_for.EXAMPLE}\n"
         "everything else:           mumacro --help"
@@ -116,7 +119,30 @@ def _no_command(words: Sequence[str]) -> str:
     similar = difflib.get_close_matches(words[0], COMMANDS, n=1, cutoff=0.7)
     if similar and words[0] not in NAMES:
         raise UsageError(f"unknown command {words[0]!r}: did you mean {similar[0]}?")
-    return one_case.run(words, OVERVIEW)
+    return _one_case(words)
+
+
+def _one_case(words: Sequence[str]) -> str:
+    """Run ``mumacro "mu0=0.3 ..."``: return the friction of one case."""
+    parser = OneLineParser(prog="mumacro", description=OVERVIEW + common.ABOUT_INPUTS)
+    common.add_case(parser, "the six inputs, quoted together or apart")
+    common.add_options(parser, "include")
+    parser.add_argument(
+        "--model", action="store_true", help="in JSON, too: what the model leaves out in this case"
+    )
+    parser.add_argument("--version", action="version", version=f"mumacro {__version__}")
+    options = parser.parse_intermixed_args(words)
+    kind = kind_of(options.contact, options.direction)
+    case = common.read_case(options.words, kind, deviations=True)
+    surrogate, include = common.open_table(options.table), common.included(options)
+    inputs: dict[str, Any] = {**case.inputs, **kind.names, "include": include}
+    answer: Any = surrogate.evaluate(**inputs)
+    if options.json:
+        model = {"model": rows_of(answer)} if options.model else {}
+        return common.as_json({**answer.to_dict(), **model}, surrogate)
+    rows, notes, error = in_words(answer, case.units)
+    lines = [common.case_line(case, kind), common.in_columns(rows)]
+    return "\n".join([*lines, *([common.in_columns(notes)] if notes else []), error])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -142,6 +142,23 @@ class Cases(NamedTuple):
             check(columns, f, (cases.size,) if shape else ())
         return cases._with_legal_deviations(strict or not shape) if std else cases
 
+    @classmethod
+    def of_numbers(cls, names: tuple[str, ...], six: Iterable[Any], kind: Kind) -> "Cases":
+        """Return one case of an amplitude y0 in plain numbers, without a check; ``names`` tell
+        whether one of them is f or omega."""
+        mu0, load, k, y0, rate, v0 = map(float, six)
+        f = rate if "f" in names else None
+        omega = rate if f is None else RAD_PER_CYCLE * f
+        columns: dict[str, float | Array] = {
+            "mu0": mu0,
+            "Fz": load,
+            "k": k,
+            "y0": y0,
+            "omega": omega,
+            "v0": v0,
+        }
+        return cls(kind, columns, (), None, {}, f)
+
     @property
     def fields(self) -> tuple[str, ...]:
         """Return the names of the inputs."""

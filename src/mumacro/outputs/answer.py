@@ -224,7 +224,10 @@ class Answer(Result, Generic[Number]):
         """Return the cases that were evaluated."""
         if self._cases is None:
             kind, names, six = self._plain
-            self._cases = Cases.of(dict(zip(names, six, strict=True)), kind)
+            if self._shape:
+                self._cases = Cases.of(dict(zip(names, six, strict=True)), kind)
+            else:
+                self._cases = Cases.of_numbers(names, six, kind)
         return self._cases
 
     @property

@@ -2,13 +2,11 @@
 
 import math
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from mumacro.inputs.cases import Cases
-from mumacro.inputs.fields import AMPLITUDE
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import Detail
 from mumacro.outputs.tabulated import Tabulated
@@ -25,6 +23,10 @@ class Evaluated:
     v_tilde: Any
     y_tilde: Any
     length_scale: Any
+    #: whether anything oscillates; whether the contact is elastic, too, with v~ and y~ within
+    #: double range
+    moving: Any
+    usable: Any
     mu_macro_low: Any
     mu_macro_high: Any
     #: d mu_macro / d input and their bounds, by field
@@ -50,6 +52,9 @@ class Evaluated:
         if detail != "values":
             self.v_tilde, self.y_tilde = take(row.v_tilde), take(row.y_tilde)
             self.length_scale = take(row.length_scale)
+            columns = self.columns
+            self.moving = (columns[self.kind.amplitude] != 0.0) & (columns["omega"] != 0.0)
+            self.usable = (self.y_tilde < math.inf) & self.moving
         if detail == "gradient":
             fields = self.kind.fields
             self.gradient = dict(zip(fields, map(take, row.gradient), strict=True))
@@ -67,22 +72,10 @@ class Evaluated:
         self.mu_macro_high = take(np.fmax(self.mu_macro, high))
         self.error_bound = take(np.fmax(self.error_bound, bound))
 
-    @cached_property
-    def moving(self) -> Any:
-        """Return whether anything oscillates."""
-        amplitude = self.columns[AMPLITUDE if self.kind.normal else "y0"]
-        return (amplitude != 0.0) & (self.columns["omega"] != 0.0)
-
-    @cached_property
+    @property
     def rigid(self) -> Any:
         """Return whether the contact is rigid."""
         return self.columns["k"] == math.inf
-
-    @cached_property
-    def usable(self) -> Any:
-        """Return whether the contact is elastic and oscillates, with v~ and y~ within double
-        range."""
-        return (self.y_tilde < math.inf) & self.moving
 
     def quantity(self, name: str, v: Any, y: Any, kind: Any = None) -> tuple[Any, Any]:
         """Return a tabulated quantity at v~ and y~ in the shape of the cases, and its bound."""

@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Iterable
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
 
 from mumacro.errors import InputError
-from mumacro.inputs.cases import Cases
+from mumacro.inputs.cases import Cases, check
 from mumacro.inputs.fields import BALL, Kind
 from mumacro.kernel.binding import Detail
 from mumacro.outputs import OUTPUTS
@@ -23,9 +23,6 @@ from mumacro.outputs.tabulated import Tabulated
 _COSTS = {"ball": 2.0, "along": 10.0, "normal": 10.0}
 _BALL_ALONG = 5.0  # a further factor, since a ball along is a sum over springs
 _INTERVAL = 200.0
-
-
-_NO_NAMES = frozenset[str]()
 
 
 def names_in(include: Iterable[str] | str) -> list[str]:
@@ -55,26 +52,22 @@ def chosen(
     Raise InputError for an unknown name, for an output that does not exist for the cases, and for
     std without a deviation.
     """
-    is_empty = type(include) is tuple and not include
-    names = _NO_NAMES if is_empty else frozenset(names_in(include))
-    if gradient:
-        names |= {"gradient"}
-    if not names and not cases.std:
+    names = () if type(include) is tuple and not include else names_in(include)
+    if not names and not gradient and not cases.std:
         return ()
-    return _chosen(names, cases.kind, bool(cases.std), cases.ends is not None)
+    return _chosen((*names,), bool(gradient), cases.kind, bool(cases.std), cases.ends is not None)
 
 
-@cache
+@lru_cache(512)
 def _chosen(
-    names: frozenset[str], kind: Kind, deviations: bool, interval: bool
+    names: tuple[str, ...], gradient: bool, kind: Kind, deviations: bool, interval: bool
 ) -> tuple[Output, ...]:
     """Return the same from the properties of the cases on which it depends."""
     if "std" in names and not deviations:
         bound = "without std where no input has a deviation: give one, such as std_k"
         raise InputError("include", "std", bound)
-    if deviations:
-        names |= {"std"}
-    outputs = tuple(output for name, output in OUTPUTS.items() if name in names)
+    wanted = {*names, *["gradient"] * gradient, *["std"] * deviations}
+    outputs = tuple(output for name, output in OUTPUTS.items() if name in wanted)
     lacking = {*kind.names.values()} | ({"interval"} if interval else set())
     for output in outputs:
         for word in lacking & output.lacks.keys():
@@ -85,12 +78,7 @@ def _chosen(
 
 def paths_of(outputs: Iterable[Output], fields: tuple[str, ...]) -> tuple[str, ...]:
     """Return the paths of all values of the outputs, for cases with these inputs, in order."""
-    return _paths(tuple(output.name for output in outputs), fields)
-
-
-@cache
-def _paths(names: tuple[str, ...], fields: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(path for name in names for path in OUTPUTS[name].paths(fields))
+    return tuple(path for output in outputs for path in output.paths(fields))
 
 
 def cost(outputs: Iterable[Output], cases: Cases) -> float:
@@ -114,7 +102,7 @@ def evaluate_cases(
 ) -> Answer[Any]:
     """Return the answer to cases with these outputs; ``groups`` adds v~, y~ and l0."""
     detail: Detail = "groups" if outputs or groups else "values"
-    if outputs and any(output.gradient for output in outputs):
+    if outputs and [output for output in outputs if output.gradient]:
         detail = "gradient"
     if not cases.shape:
         return _of_one(Evaluated(tabulated, cases, detail), outputs)
@@ -127,10 +115,12 @@ def evaluate_cases(
 
 
 def _of_one(case: Evaluated, outputs: tuple[Output, ...]) -> Answer[float]:
-    """Return the answer to one case, in plain numbers."""
+    """Return the answer to one case, in plain numbers.  Raise InputError for an illegal value."""
+    if case.source < 0:
+        check(case.columns, case.cases.f)
     values: Values = {}
     for output in outputs:
-        values |= output.compute(case)
+        values.update(output.compute(case))
     cases = case.cases
     answer: Answer[Any] = Answer(
         case.mu_macro,
@@ -140,9 +130,8 @@ def _of_one(case: Evaluated, outputs: tuple[Output, ...]) -> Answer[float]:
         (case.v_tilde, case.y_tilde, case.length_scale),
         cases,
     )
-    if outputs:
-        paths = paths_of(outputs, cases.kind.fields)
-        answer.outputs = {path: float(values[path]) for path in paths}
+    if values:
+        answer.outputs = {path: float(value) for path, value in values.items()}
     if cases.ends is not None:
         for name in BAND:
             setattr(answer, name, getattr(case, name))
