@@ -28,9 +28,8 @@ from mumacro.inputs.fields import (
     Kind,
     kind_of,
 )
-from mumacro.inputs.numbers import plain
 from mumacro.inputs.stiffening import ROUGH, Stiffening
-from mumacro.inputs.units import choose_unit, format_number, known, suit_unit, tidy_zeros
+from mumacro.inputs.units import choose_unit, format_number, known, plain, suit_unit, tidy_zeros
 from mumacro.outputs import MEMBERS
 from mumacro.outputs.answer import BAND, Answer
 from mumacro.outputs.settling import REMAINING, decay_of_springs

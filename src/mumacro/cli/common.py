@@ -20,7 +20,7 @@ import numpy as np
 
 from mumacro import plotting
 from mumacro.errors import InputError, MumacroError
-from mumacro.inputs.case import NO_DEVIATION, Value, read, read_one
+from mumacro.inputs.case import NO_DEVIATION, Value, check_signs, read, read_one
 from mumacro.inputs.cases import A_DEVIATION, EXACT, KIND, check
 from mumacro.inputs.fields import (
     AMPLITUDE,
@@ -34,7 +34,6 @@ from mumacro.inputs.fields import (
     in_help,
 )
 from mumacro.inputs.names import suggestion
-from mumacro.inputs.numbers import check_signs
 from mumacro.inputs.units import belongs_to_value, choose_unit, format_number, tidy_zeros, unit_of
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.evaluation import names_in

@@ -331,3 +331,25 @@ def _interval(name: str, quantity: str, raw: str, text: str) -> Value:
         raise InputError(name, raw, _INTERVAL)
     middle = min(max(math.sqrt(ends[0]) * math.sqrt(ends[1]), ends[0]), ends[1])
     return Value(middle, None, *ends, raw, symbol)
+
+
+# --- the texts of one case ------------------------------------------------------------------------
+
+_GERMAN = re.compile(r"\d,(?:\d{1,2}|\d{4,})(?!\d)|\d\.\d{3}\.\d{3}(?!\d)|\d\.\d{3},\d")
+_EITHER = re.compile(r"(?<![\d.,])([1-9]\d{0,2})\.(\d{3})(?![\d.,])")
+
+
+def check_signs(texts: Mapping[str, str]) -> None:
+    """Raise InputError for a text of a case that is ambiguous because of another one: if another
+    text has a decimal comma, 20.000 may be twenty thousand.
+
+    >>> check_signs({"mu0": "0,3", "f": "20 kHz", "v0": "0.01"})
+    """
+    german = next((name for name, text in texts.items() if _GERMAN.search(text)), None)
+    if german is None:
+        return
+    for name, text in texts.items():
+        if match := _EITHER.search(text):
+            whole, part = f"{match[1]}{match[2]}", f"{float(match[0]):g}"
+            bound = f'clear beside {german} = "{texts[german]}": it may be {whole} or {part}'
+            raise InputError(name, text, f"{bound}; write that")

@@ -16,7 +16,7 @@ import numpy as np
 
 from mumacro.errors import InputError
 from mumacro.inputs.carried import library, two_units, units_of_fields
-from mumacro.inputs.case import NO_DEVIATION, NUMBERS, Value, read
+from mumacro.inputs.case import NO_DEVIATION, NUMBERS, Value, check_signs, read
 from mumacro.inputs.columns import (
     Column,
     Fault,
@@ -46,7 +46,6 @@ from mumacro.inputs.fields import (
     refusal,
 )
 from mumacro.inputs.names import in_place_of, split_unit, suggestion
-from mumacro.inputs.numbers import check_signs
 from mumacro.inputs.units import scale_of
 from mumacro.kernel.arrays import Array, flat
 

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE
-from mumacro.inputs.numbers import plain
-from mumacro.inputs.units import Unit, parse_unit, quantity_of
+from mumacro.inputs.units import Unit, parse_unit, plain, quantity_of
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.results import REMARK, Note
 

@@ -1,13 +1,9 @@
 """Read numbers as people and instruments write them: decimal point or comma, thousands separators,
-Fortran's exponent, powers of ten.  They may be in a text, in the texts of one case, or in a
-sentence."""
+Fortran's exponent, powers of ten."""
 
 import functools
 import re
 import unicodedata
-from collections.abc import Mapping
-
-from mumacro.errors import InputError
 
 #: other characters with the same meaning: minus and dashes of typography, a slash, apostrophes
 _SIGNS = str.maketrans("−–‐‑∕⁄’", "----//'")
@@ -24,15 +20,6 @@ _TEN = re.compile(r"([+-]?)10\^([+-]?\d{1,3})", re.ASCII)
 # digits in groups of three after one separator
 _GROUPS = re.compile(r"\d{1,3}([.,' ])\d{3}(?:\1\d{3})*", re.ASCII)
 TOO_LARGE = "is too large, above 1.8e308"
-
-
-def plain(value: float, digits: int) -> str:
-    """Return a number for a sentence, without a power of ten if it has up to twelve digits.
-
-    >>> plain(20618.6, 3), plain(251.3, 2), plain(0.00103, 3), plain(2e15, 3)
-    ('20600', '250', '0.00103', '2e+15')
-    """
-    return f"{float(f'{value:.{digits}g}'):.12g}"
 
 
 def tidy(text: str) -> str:
@@ -192,21 +179,3 @@ def split_number(text: str) -> tuple[float, str]:
 
 # a comma that can only be decimal, points that can only separate thousands; a point that may be
 # either
-_GERMAN = re.compile(r"\d,(?:\d{1,2}|\d{4,})(?!\d)|\d\.\d{3}\.\d{3}(?!\d)|\d\.\d{3},\d")
-_EITHER = re.compile(r"(?<![\d.,])([1-9]\d{0,2})\.(\d{3})(?![\d.,])")
-
-
-def check_signs(texts: Mapping[str, str]) -> None:
-    """Raise InputError for a text of a case that is ambiguous because of another one: if another
-    text has a decimal comma, 20.000 may be twenty thousand.
-
-    >>> check_signs({"mu0": "0,3", "f": "20 kHz", "v0": "0.01"})
-    """
-    german = next((name for name, text in texts.items() if _GERMAN.search(text)), None)
-    if german is None:
-        return
-    for name, text in texts.items():
-        if match := _EITHER.search(text):
-            whole, part = f"{match[1]}{match[2]}", f"{float(match[0]):g}"
-            bound = f'clear beside {german} = "{texts[german]}": it may be {whole} or {part}'
-            raise InputError(name, text, f"{bound}; write that")

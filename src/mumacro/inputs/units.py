@@ -517,6 +517,15 @@ def known(value: float, digits: int, error: float = 0.0, deviation: float = 0.0)
     return f"{rounded:#.{count}g}".removesuffix(".")
 
 
+def plain(value: float, digits: int) -> str:
+    """Return a number for a sentence, without a power of ten if it has up to twelve digits.
+
+    >>> plain(20618.6, 3), plain(251.3, 2), plain(0.00103, 3), plain(2e15, 3)
+    ('20600', '250', '0.00103', '2e+15')
+    """
+    return f"{float(f'{value:.{digits}g}'):.12g}"
+
+
 def choose_unit(name: str, value: float, typed: Mapping[str, str]) -> Unit:
     """Return the unit in which an input is shown: the unit that was typed, or a suitable one for a
     value [SI].

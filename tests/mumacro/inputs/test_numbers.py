@@ -5,8 +5,9 @@ import pytest
 
 from mumacro import InputError
 from mumacro.errors import TextError
+from mumacro.inputs.case import check_signs
 from mumacro.inputs.cells import Cell, Signs
-from mumacro.inputs.numbers import check_signs, read_number
+from mumacro.inputs.numbers import read_number
 
 
 @pytest.mark.parametrize(
