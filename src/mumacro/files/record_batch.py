@@ -179,7 +179,7 @@ def find_columns(
             faults.append(f"the column {names[i]!r} has another unit in its field: {unit}")
     words = [name for name in KIND if name in names]
     faults += [
-        f"the column {name!r} is there twice"
+        f"the column {name!r} is there twice; rename one"
         for name, count in Counter(names).items()
         if count > 1 and split_unit(name)[0] not in heads
     ]

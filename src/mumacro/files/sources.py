@@ -188,7 +188,7 @@ class TextSource:
             except TextError as error:
                 raise FilesError(f"{path}: {error}") from None
             self.tables.append(table)
-            heads, decimal = table.account.units.heads, table.signs.decimal
+            heads, decimal = _named(table.account.units.heads), table.signs.decimal
             if len(self.tables) == 1:
                 self.heads, self.decimal = heads, decimal or "."
             if heads != self.heads:
@@ -229,6 +229,17 @@ class TextSource:
                 yield RowBlock(batch, rows, piece.share, table.signs)
         except TextError as error:
             raise FilesError(f"{self.files[file]}: {error}") from None
+
+
+def _named(heads: Sequence[str]) -> Sequence[str]:
+    """Return the names of columns.  Where several have none, they get those of their places.
+
+    >>> _named(["", "v0"]), _named(["", "v0", ""])
+    (['', 'v0'], ['column 1', 'v0', 'column 3'])
+    """
+    if heads.count("") < 2:
+        return heads
+    return [head or f"column {place}" for place, head in enumerate(heads, 1)]
 
 
 def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] | None:

@@ -353,7 +353,8 @@ def names_statistics(text: str) -> bool:
 def _irregular(count: int, width: int) -> str:
     """Return what is wrong with a row that has this number of cells."""
     cells = "cell" if count == 1 else "cells"
-    return f"has {count:,} {cells}, the header has {width:,}"
+    names = ": name every column, also that of the row numbers" if count == width + 1 else ""
+    return f"has {count:,} {cells}, the header has {width:,}{names}"
 
 
 def unclosed(line: int) -> TextError:

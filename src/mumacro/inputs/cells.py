@@ -17,7 +17,7 @@ import numpy as np
 from mumacro.errors import TextError
 from mumacro.inputs.fields import QUANTITY_OF, RIGID, is_rigid
 from mumacro.inputs.numbers import NUMBER, read_number, tidy
-from mumacro.inputs.units import QUANTITIES, Scale, canonical, scale_of
+from mumacro.inputs.units import QUANTITIES, Scale, canonical, explain_unit, scale_of
 from mumacro.kernel.arrays import Array
 
 BLANKS = " "  #: the separator if any number of blanks separates the cells
@@ -284,14 +284,19 @@ def _no_number(name: str, text: str, fault: str) -> str:
     if ".." in text or "±" in text:
         if name == "k":
             return "must be one number; its ends are columns k_low and k_high, a deviation std_k"
-        return "must be one number; a deviation is a column std"
+        return f"must be one number; a deviation is a column std_{name}, in points of a fit std"
     if not text.strip("0123456789.,'’+-−eEdD \u00a0\u202f"):
         return fault  # such as a separator that is not the decimal one
     tidied = tidy(text)
     number = NUMBER.match(tidied)
     unit = tidied[number.end() :].strip() if number else ""
-    if unit and (is_unit(unit) or scale_of(name, unit) is not None):
+    if unit and scale_of(name, unit) is not None:
         return f"must be a number alone: write its unit into the header, as in {name} [{unit}]"
+    quantity = QUANTITY_OF[name]
+    if unit and (bound := explain_unit(quantity, 1.0, unit)) != QUANTITIES[quantity].bound:
+        return f"must be {bound} in place of 1 {unit}"
+    if unit and is_unit(unit):
+        return f"must be a number: {unit} is no unit of {name}"
     return "must be a number"
 
 

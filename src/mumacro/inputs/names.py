@@ -2,6 +2,7 @@
 with a unit.  Return also the unit, and the advice for a name that is unknown or missing."""
 
 import difflib
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
@@ -85,8 +86,10 @@ def unknown_name(name: str, allowed: Iterable[str]) -> str:
         return f"must be {bound}"
     nearest = suggestion(name[:80], loosely=False)
     if nearest not in names:
-        nearest = next(iter(difflib.get_close_matches(name[:80], names, n=1, cutoff=0.6)), None)
-    advice = f"did you mean {nearest}? " if nearest else ""
+        alike = difflib.get_close_matches(name[:80], names, n=1, cutoff=0.6)
+        first = meant_by(name[:80], loosely=False)
+        nearest = alike[0] if alike else first if first in names else None
+    advice = f"did you mean {nearest}{_part_of(name, nearest)}? " if nearest else ""
     return f"unknown field; {advice}allowed: {', '.join(names)}"
 
 
@@ -252,7 +255,7 @@ def _similar(name: str, heads: Sequence[str]) -> tuple[str, str] | None:
         for head in candidates:
             if field := _stands_for(head, name, loosely):
                 column = f"{field} [{_unit_in_head(head, field) or unit_of(field)}]"
-                return head, column + (_HALVED if _is_whole(head, field) else "")
+                return head, column + _part_of(head, field)
     return None
 
 
@@ -270,35 +273,49 @@ def _stands_for(head: str, name: str, loosely: bool) -> str | None:
     return field if field in (name, {"omega": "f"}.get(name)) else None
 
 
-_HALVED = ", with half of each value: it is peak to peak"
-_PEAK_TO_PEAK = re.compile(
-    r"p(?:ea)?k[\W_]*+(?:to|2)?+[\W_]*+p(?:ea)?k|(?<![a-z])p[\W_]?(?:to|2|t)?[\W_]?p(?![a-z])"
-    r"|double[\W_]amplitude",
-    re.IGNORECASE,
-)
+# how people say that a value is more or less than the amplitude, and what to give
+_PARTS = {
+    re.compile(
+        r"p(?:ea)?k[\W_]*+(?:to|2)?+[\W_]*+p(?:ea)?k|(?<![a-z])p[\W_]?(?:to|2|t)?[\W_]?p(?![a-z])"
+        r"|double[\W_]amplitude|(?<![a-z])s[\W_]?s(?![a-z])|spitze[\W_]*+spitze",
+        re.IGNORECASE,
+    ): ", with half of each value: it is peak to peak",
+    re.compile(r"(?<![a-z])(?:rms|eff)(?![a-z])", re.IGNORECASE): (
+        f", with {math.sqrt(2.0):.6g} times each value, if it is a sine: it is rms"
+    ),
+}
 
 
-def _is_whole(head: str, field: str) -> bool:
-    """Return whether a header says that its column is twice the amplitude.
+def _part_of(name: str, field: str) -> str:
+    """Return what to do with the values of a name that says that they are not the amplitude.
 
-    >>> _is_whole("Amplitude p-p [um]", "y0"), _is_whole("peak amplitude [um]", "y0")
-    (True, False)
+    >>> _part_of("Amplitude p-p [um]", "y0"), _part_of("peak amplitude [um]", "y0")
+    (', with half of each value: it is peak to peak', '')
+    >>> _part_of("y0_rms", "y0")
+    ', with 1.41421 times each value, if it is a sine: it is rms'
     """
-    return field in ("y0", "Fz_amplitude") and _PEAK_TO_PEAK.search(head[:80]) is not None
+    if field not in ("y0", "Fz_amplitude"):
+        return ""
+    return next((advice for part, advice in _PARTS.items() if part.search(name[:80])), "")
 
 
 def _unit_in_head(head: str, field: str) -> str | None:
-    """Return the unit that a header has in brackets, or as its last words.
+    """Return the unit that a header has in brackets of any kind, or as its last words.
 
     >>> [_unit_in_head(head, "y0") for head in ("Amplitude [um]", "Amplitude µm", "amplitude")]
     ['um', 'µm', None]
     >>> _unit_in_head("v0_um_s", "v0"), _unit_in_head("k_N_per_mm", "k")
     ('um/s', 'N/mm')
+    >>> _unit_in_head("v0 {mm/s}", "v0"), _unit_in_head("Amplitude [um p-p]", "y0")
+    ('mm/s', 'um')
     """
     unit = split_unit(head)[1]
-    if unit is not None:
+    if unit is not None and scale_of(field, unit) is not None:
         return unit
-    words = re.sub(r"[\s_]+", " ", head[:80].strip()).split(" ")
+    text = head[:80]
+    for part in _PARTS:
+        text = part.sub(" ", text)
+    words = re.split(r"[\s_:|<>{}()\[\]]+", text.strip(" _:|<>{}()[]*"))
     for ratio in (" ".join(words[-3:]), "/".join(words[-2:])):
         if len(words) > 2 and scale_of(field, ratio) is not None:
             return canonical(ratio)

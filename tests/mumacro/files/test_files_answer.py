@@ -253,6 +253,14 @@ SIMILAR = "{!r} is similar: rename that column to {}"
         ),
         ("mu0,Fz,k_N_per_mm,y0,f,v0", {}, [SIMILAR.format("k_N_per_mm", "k [N/mm]")]),
         ("mu0,Fz,k,y0,frequency,v0", {}, [SIMILAR.format("frequency", "f [Hz]")]),
+        *(
+            (f"mu0,Fz,k,{name},f,v0", {}, [f"y0 [um], with {part} each value"])
+            for part, of_part in (
+                ("half of", ("y0 pp [um]", "Amplitude [um p-p]", "y0_SS {um}")),
+                ("1.41421 times", ("y0_rms [um]", "amplitude RMS (um)", "y0 <um eff>")),
+            )
+            for name in of_part
+        ),
         (
             "mu0,Fz,k [psi],y0,omega [Hz],v0",
             {},

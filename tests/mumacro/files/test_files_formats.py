@@ -235,7 +235,7 @@ def test_bad_rows_of_csv_land_in_the_side_file_and_only_there(
         (4, "mu0", "must be a number"),
         (5, "v0", "is missing"),
         (6, "", "has 5 cells, the header has 6"),
-        (7, "", "has 7 cells, the header has 6"),
+        (7, "", "has 7 cells, the header has 6: name every column, also that of the row numbers"),
         (8, "k", MISSING_K),
         (12, "k", MISSING_K),
         (13, "k", "is too large, above 1.8e308"),

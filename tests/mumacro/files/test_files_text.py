@@ -369,6 +369,32 @@ def sheets(path: Path, **rows_of: Any) -> Path:
     return path
 
 
+@pytest.mark.parametrize("end", ["csv", "parquet"])
+def test_a_table_may_begin_in_any_column_and_have_columns_without_a_name(
+    tmp_path: Path, end: str
+) -> None:
+    head: list[Any] = [None, None, "mu0", "Fz", None, "k", "y0", "f", "v0", None, "note"]
+    row: list[Any] = [None, "a", 0.3, 10, "b", 1e6, 2e-6, 20000, 0.01, None, "c"]
+    path = sheets(tmp_path / "cases.xlsx", data=[[], head, row])
+    out = tmp_path / f"out.{end}"
+    evaluate_files([path], out, TABLE)
+    if end == "parquet":
+        (answer,) = pa.parquet.read_table(out).to_pylist()
+    else:
+        (answer,) = rows_of(out)
+    assert [answer[f"column {i}"] or "" for i in (1, 2, 5, 10)] == ["", "a", "b", ""]
+    assert answer["note"] == "c"
+    assert float(answer["mu_macro"]) == close(MU[0], rel=1e-12)
+
+
+def test_rows_with_numbers_that_the_header_does_not_name_are_told_so(tmp_path: Path) -> None:
+    path, out = tmp_path / "cases.txt", tmp_path / "out.csv"
+    path.write_text('"mu0" "Fz" "k" "y0" "f" "v0"\n"1" 0.3 10 1e6 2e-6 2e4 0.01\n')
+    assert evaluate_files([path], out, TABLE).rejected == 1
+    (reject,) = rows_of(tmp_path / "out.csv.rejects.csv")
+    assert reject["reason"].endswith("name every column, also that of the row numbers")
+
+
 CASE_ROWS: list[list[Any]] = [HEAD.split(","), [0.3, 10, 1e6, 2e-6, 20000, 0.01]]
 
 
