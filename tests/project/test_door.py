@@ -77,6 +77,11 @@ def _unit(name: str) -> Any:
     return getattr(package("astropy.units"), name)
 
 
+def _magnitude(number: float, unit: str) -> Any:
+    units = package("astropy.units")
+    return units.Magnitude(number, units.mag(_unit(unit)))
+
+
 def _unyt(number: Any, unit: str) -> Any:
     unyt = package("unyt")
     return (unyt.unyt_array if np.ndim(number) else unyt.unyt_quantity)(number, unit)
@@ -106,6 +111,13 @@ QUANTITIES: dict[str, tuple[str, Kind]] = {
     "astropy": ("astropy.units", (lambda: {"y0": 2.5 * _unit("um")}, {"y0": 2.5e-6})),
     "astropy, wrong": ("astropy.units", (lambda: {"y0": 2.5 * _unit("s")}, "y0")),
     "astropy, a level": ("astropy.units", (lambda: {"mu0": -10.0 * _unit("dB")}, "mu0")),
+    "astropy, a positive level": ("astropy.units", (lambda: {"Fz": 10.0 * _unit("dB")}, "Fz")),
+    "astropy, a magnitude": ("astropy.units", (lambda: {"y0": 2.0 * _unit("mag")}, "y0")),
+    "astropy, a logarithm": ("astropy.units", (lambda: {"y0": _magnitude(2.0, "um")}, "y0")),
+    "astropy, data with a unit": (
+        "astropy.nddata",
+        (lambda: {"y0": package("astropy.nddata").NDData(2.0, unit="um")}, "y0"),
+    ),
     "astropy, a unit alone": ("astropy.units", (lambda: {"y0": _unit("um")}, "y0")),
     "astropy in per cent": (
         "astropy.units",

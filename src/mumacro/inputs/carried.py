@@ -2,6 +2,7 @@
 pandas, h5py, netCDF4 or uncertainties).  No library is imported: a value is recognised by its
 attributes."""
 
+import inspect
 import math
 from collections.abc import Mapping
 from contextlib import suppress
@@ -78,7 +79,8 @@ def _unit_of_quantity(value: Any) -> Any:
     """Return the unit of a quantity of pint, astropy, unyt or a similar library."""
     for attribute in ("units", "unit"):
         unit = getattr(value, attribute, None)
-        if unit is not None and not callable(unit) and unit is not value:
+        # a logarithmic unit of astropy can be called, too
+        if unit is not None and not inspect.isroutine(unit) and unit is not value:
             return unit
     return None
 
@@ -199,7 +201,9 @@ def _scale_by_library(unit: Any, text: str, quantity: str) -> float | None:
     si = QUANTITIES[quantity].unit
     for target in (si, "dimensionless", "") if si == "-" else (si,):
         with suppress(Exception):  # each library has errors of its own
-            return float(_magnitude((1.0 * unit).to(target)))
+            one, two = (float(_magnitude((times * unit).to(target))) for times in (1.0, 2.0))
+            # a level, or a temperature, is no multiple of its unit
+            return one if math.isclose(two, 2.0 * one, rel_tol=1e-12) else None
     return None
 
 

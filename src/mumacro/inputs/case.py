@@ -114,7 +114,10 @@ def read(name: str, value: Any, quantity: str = "") -> Value:
     unit = carried_unit(value)
     if unit is not None:
         of_value = read_unit(name, unit, quantity, value)
-        return read(name, numbers_in(value), quantity).scaled(name, of_value)
+        number = numbers_in(value)
+        if isinstance(number, np.ndarray) and number.dtype == object and not number.ndim:
+            raise InputError(name, value, A_NUMBER)  # nothing that its library calls a number
+        return read(name, number, quantity).scaled(name, of_value)
     if (pair := uncertain(value)) is not None:
         return Value(*pair)
     plain = without_mask(value)

@@ -305,11 +305,12 @@ def canonical(unit: str) -> str:
         text = text.replace(times, " ")
     powers: dict[str, int] = {}
     for i, part in enumerate(text.split("/")):
-        for factor in part.replace("(", " ").replace(")", " ").split():
-            if factor == "1":
-                continue
+        factors = part.replace("(", " ").replace(")", " ").split()
+        if factors == ["1"] and i == 0:  # of 1/s
+            continue
+        for factor in factors:
             match = _FACTOR.fullmatch(factor)
-            if match is None:
+            if match is None or match[2] in ("0", "+0", "-0"):
                 return text
             name = match[1]
             symbol = name if name in _SYMBOLS else _NAMED.get(name.lower(), name)
