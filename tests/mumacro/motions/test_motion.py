@@ -815,6 +815,11 @@ def test_no_motion_at_all_is_told() -> None:
     assert motion(**RIG, x=np.array([0.0, 1e-6, 0.0])).remarks[0]["cases"] == 2
 
 
+def test_an_empty_tuple_is_no_motion_left_out() -> None:
+    with refused("x"):
+        motion(**RIG, x=())
+
+
 def test_a_tuple_of_triples_is_a_list_of_them() -> None:
     triples = ((1, 2e-6, 0.0), (3, 1e-6, 90.0))
     assert motion(**RIG, x=triples).mu_macro == motion(**RIG, x=[*triples]).mu_macro
