@@ -199,10 +199,12 @@ def _outside(six: Mapping[str, Array], oscillates: Bools) -> Iterator[tuple[str,
         yield name, ((column < least) | (column > most)) & np.isfinite(column) & (column > 0.0)
     length = six["mu0"] * six["Fz"] / six["k"]
     elastic = (length > 0.0) & (six["Fz"] > 0.0) & (six["k"] > 0.0)
+    elastic &= np.isfinite(six["mu0"]) & np.isfinite(six["Fz"])
     moves = oscillates & elastic
     yield "l0", (length > LONGEST) & elastic
-    yield "y~", (six["y0"] / length > FURTHEST) & moves
-    yield "v~", (six["v0"] / six["omega"] / length > FURTHEST) & moves
+    yield "y~", (six["y0"] / length > FURTHEST) & moves & np.isfinite(six["y0"])
+    fast = six["v0"] / six["omega"] / length > FURTHEST
+    yield "v~", fast & moves & np.isfinite(six["v0"])
     speed = six["y0"] * six["omega"]
     yield "y0 omega", (speed > FASTEST) & np.isfinite(speed)
 
