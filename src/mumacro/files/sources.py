@@ -264,16 +264,12 @@ def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] |
         return None
     lines = piece.lines
     numbers = [columns[i] for i in inputs]
-    # a line begins with a text before the first column in which every line has a number
-    full = (i for i in sorted(inputs) if not columns[i].null_count)
-    begins = columns[: next(full, None)]
-    texts = [column for i, column in enumerate(begins) if i not in inputs]
     has_number = functools.reduce(pc.or_, map(pc.is_valid, numbers))
     if (
         len(has_number) != len(lines)
         or not pc.all(has_number).as_py()
         or _has_infinity(numbers)
-        or any(map(_may_begin_no_row, texts))
+        or any(map(_may_begin_no_row, _beginnings(columns)))
     ):
         return None
     account.units.rows_begun = True
@@ -298,6 +294,19 @@ def _rows_one_by_one(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Arra
 def _has_infinity(columns: Iterable[pa.Array]) -> bool:
     """Return whether a number has too many digits, which must not become a rigid contact."""
     return any(pc.any(pc.is_inf(column)).as_py() for column in columns)
+
+
+def _beginnings(columns: Iterable[pa.Array]) -> Iterator[pa.Array]:
+    """Yield the columns of texts in which a line may begin: up to the first column, of texts or
+    numbers, that no line leaves empty."""
+    for column in columns:
+        if not pa.types.is_string(column.type):
+            if not column.null_count:
+                return
+            continue
+        yield column
+        if pc.min(pc.utf8_length(pc.utf8_trim_whitespace(column))).as_py():
+            return
 
 
 def _may_begin_no_row(column: pa.Array) -> bool:

@@ -22,7 +22,7 @@ from tests.support.comparing import close
 pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
 
 from mumacro.cli.main import main  # noqa: E402
-from mumacro.files import FilesError, evaluate_files  # noqa: E402
+from mumacro.files import FilesError, evaluate_files, sources  # noqa: E402
 from mumacro.inputs import decoding  # noqa: E402
 from mumacro.inputs.layout import Dialect  # noqa: E402
 
@@ -277,6 +277,20 @@ def test_a_head_of_a_hundred_thousand_columns(tmp_path: Path, capsys: Capture) -
     capsys.readouterr()
     assert main(["eval", str(source), "-o", str(out), "--force"]) == 1
     assert len(capsys.readouterr().err) < 2000
+
+
+def test_only_the_columns_in_which_a_line_may_begin_are_looked_through(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked_through = Mock(side_effect=sources._may_begin_no_row)
+    monkeypatch.setattr(sources, "_may_begin_no_row", looked_through)
+    head, row = ",".join(f"c{i}" for i in range(50)), ",".join(["1"] * 48)
+    text = f"{head},{HEAD}\n" + "".join(
+        f"{cell},b,{row},{line}\n" for cell, line in zip(("a", ""), ROWS.splitlines(), strict=True)
+    )
+    (tmp_path / "cases.csv").write_text(text)
+    assert evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE).answered == 2
+    assert looked_through.call_count == 2
 
 
 def test_a_row_without_a_value_is_rejected_and_the_run_goes_on(tmp_path: Path) -> None:
