@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mumacro import Surrogate
-from tests.support.cases import Case
+from tests.support.cases import UNIT, Case
 from tests.support.comparing import close
 
 HUGE: Case = {"mu0": 1e200, "Fz": 1e200, "k": 1e300, "omega": 1e-200, "y0": 1e100, "v0": 1e-100}
@@ -103,3 +103,35 @@ def test_the_slope_at_rest_needs_no_product_within_range(surrogate: Surrogate) -
     usual = surrogate.evaluate(mu0=1.0, Fz=1.0, k=1.0, y0=0.5, omega=1.0, v0=0.0, gradient=True)
     other = surrogate.evaluate(**{**case, "omega": 1e200, "k": 1e100, "y0": 5e-301}, gradient=True)
     assert other.gradient["v0"] == close(1e100 * usual.gradient["v0"], rel=1e-12)
+
+
+@pytest.mark.parametrize("contact", ["spring", "ball"])
+@pytest.mark.parametrize("y", [1e-3, 0.5, 1.4, 20.0])
+def test_slopes_at_any_speed_are_numbers(surrogate: Surrogate, contact: str, y: float) -> None:
+    v = 10.0 ** np.arange(2.0, 300.0, 7.0)
+    answer = surrogate.evaluate(**UNIT, y0=y, v0=v, contact=contact, gradient=True)
+    for name in ("v0", "y0"):
+        slope, bound = answer.gradient[name], answer.gradient_bound[name]
+        assert np.isfinite(slope).all()
+        assert np.isfinite(bound).all()
+    assert np.all(np.abs(answer.gradient["v0"][1:]) <= answer.gradient["v0"][0])
+
+
+def test_the_slope_along_speed_is_infinite_at_the_corner_and_its_bound_says_so(
+    surrogate: Surrogate,
+) -> None:
+    """From rest on mu~ is a cube root of v~ at y~ = 1."""
+    for v0 in (0.0, np.zeros(2)):
+        answer: Any = surrogate.evaluate(**UNIT, y0=1.0, v0=v0, gradient=True)
+        assert np.all(answer.gradient["v0"] == math.inf)
+        assert np.all(answer.gradient_bound["v0"] == math.inf)
+
+
+def test_the_bound_of_a_slope_that_jumps_reaches_to_both_sides(surrogate: Surrogate) -> None:
+    """At rest mu~ of a ball falls to 0 at y~ = 1.5 and stays there: its slope jumps."""
+    y = 1.5 * np.array([1.0 - 1e-9, 1.0, 1.0 + 1e-9])
+    answer = surrogate.evaluate(**UNIT, y0=y, v0=0.0, contact="ball", gradient=True)
+    slopes, bounds = answer.gradient["y0"], answer.gradient_bound["y0"]
+    assert slopes[0] < -0.5 < slopes[2] == 0.0
+    assert np.all(np.abs(slopes[[0, 2]] - slopes[1]) <= bounds[1])
+    assert bounds[0] < 1e-9

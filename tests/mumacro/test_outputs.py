@@ -138,6 +138,14 @@ def test_a_part_of_cases_is_answered_as_the_whole(table: Surrogate) -> None:
     assert cases.reason(5).field == cases.part(slice(5, 6)).reason(0).field == "v0"
 
 
+def test_a_part_of_cases_names_the_frequency_of_its_own_case() -> None:
+    f = np.array([2e4, 3e4, -1.0, 4e4, -2.0])
+    cases = Cases.of(named(None, {**without(CASE, "omega"), "f": f}))
+    for i in (2, 4):
+        error = cases.part(slice(i, i + 1)).reason(0)
+        assert (error.field, error.value) == ("f", f[i])
+
+
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: " ".join(kind.names.values()))
 @pytest.mark.parametrize("v0", [1e-4, 0.02, 5.0])
 def test_limits_are_where_the_regime_changes_and_power_is_that_of_the_groups(
@@ -209,6 +217,16 @@ def test_outputs_are_found_by_their_path_or_as_a_whole(table: Surrogate) -> None
     )
 
 
+@pytest.mark.parametrize("include", [(), "groups", "power"])
+def test_a_frequency_that_is_refused_is_named_with_every_output(
+    table: Surrogate, include: Any
+) -> None:
+    for f in (-2e4, math.inf):
+        with refused("f") as caught:
+            table.evaluate(**{**without(CASE, "omega"), "f": f}, include=include)
+        assert caught.value.value == f
+
+
 def test_an_output_that_no_case_has_is_not_included(table: Surrogate) -> None:
     ends = without(CASE, "k")
     asked: list[tuple[Any, Any, Any]] = [
@@ -219,6 +237,18 @@ def test_an_output_that_no_case_has_is_not_included(table: Surrogate) -> None:
         for v0 in (0.01, [0.01, 0.02]):
             with refused("include"):
                 table.evaluate({**case, "v0": v0}, **words, **include)
+
+
+@pytest.mark.parametrize("k", [math.inf, "rigid", [math.inf, math.inf]])
+def test_rigid_contact_has_no_slope_along_k_however_it_is_asked_for(
+    table: Surrogate, k: Any
+) -> None:
+    asked: list[Any] = [{"gradient": True}, {"include": "gradient"}, {"include": "gradient,power"}]
+    for more in asked:
+        answer: Any = table.evaluate(**{**CASE, "k": k}, **more)
+        assert np.isnan(answer["gradient.k"]).all()
+        assert np.isnan(answer["gradient_bound.k"]).all()
+        assert np.isfinite(answer["gradient.v0"]).all()
 
 
 # --- deviations -----------------------------------------------------------------------------------
@@ -287,6 +317,23 @@ def test_where_first_order_is_not_enough_is_told_for_one_case(table: Surrogate) 
     assert off > 0.2 * bent["std"]
     [below] = table.evaluate(**CASE, std_v0=0.02).remarks  # v0 one deviation down is negative
     assert (below["row"], below["field"]) == ("std", "v0")
+
+
+@pytest.mark.parametrize(
+    ("case", "name", "std"),
+    [({**CASE, "v0": 0.2}, "v0", 0.16), ({**CASE, "v0": 0.05}, "omega", 0.4 * CASE["omega"])],
+)
+def test_where_the_curve_bends_on_one_side_alone_is_told(
+    table: Surrogate, case: Case, name: str, std: float
+) -> None:
+    answer: Any = table.evaluate({**case, f"std_{name}": std}, gradient=True)
+    up, down = (
+        abs(table.evaluate(**{**case, name: case[name] + step}).mu_macro - answer.mu_macro - change)
+        for step, change in ((x, x * answer.gradient[name]) for x in (std, -std))
+    )
+    assert up < 0.15 * answer["std"]
+    assert down > 0.25 * answer["std"]
+    assert [one["field"] for one in answer.remarks if one["row"] == "std"] == [name]
 
 
 def test_what_computes_no_deviation_names_one(table: Surrogate) -> None:

@@ -191,6 +191,13 @@ def test_a_copy_on_one_thread_leaves_the_original_its_threads(fine: Surrogate) -
     assert in_memory.on_threads(1).mu_ratio(0.1, 0.5) == fine.mu_ratio(0.1, 0.5)
 
 
+def test_a_copy_without_a_number_of_threads_has_the_usual_number(fine: Surrogate) -> None:
+    usual = Surrogate.open(fine.path).threads
+    for threads in (usual + 1, usual + 2):
+        several = Surrogate.open(fine.path, threads=threads)
+        assert (several.threads, several.on_threads(None).threads) == (threads, usual)
+
+
 def test_a_bundled_table_is_read_once() -> None:
     assert Surrogate.open() is Surrogate.open()
     assert Surrogate.open(1e-10, threads=1).table is Surrogate.open(1e-10).table

@@ -6,6 +6,7 @@ import struct
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
@@ -20,7 +21,7 @@ from hypothesis import strategies as st
 import mumacro
 from mumacro.kernel.stopping import StopError, current
 from service import admission as admissions
-from service import tables
+from service import batch, tables
 from service.admission import Admission
 from service.problems import RequestError
 from tests.support.admitting import run
@@ -153,6 +154,17 @@ def test_the_bytes_of_a_client_are_limited_beside_another() -> None:
     run(main, max_held_bytes=2048)
 
 
+def test_a_service_that_stops_takes_no_new_work() -> None:
+    async def main(admission: Admission) -> None:
+        await admission.take("a", False)
+        admission.begin_stop()
+        with pytest.raises(RequestError, match="the service stops"):
+            await admission.take("a", False)
+        assert admission.slots == 1
+
+    run(main)
+
+
 # --- the end of work ------------------------------------------------------------------------------
 
 
@@ -225,6 +237,45 @@ def test_more_than_the_slots_may_come_again_after_a_wait_and_the_others_go_on(
             end.set()
         assert [answer.result().status_code for answer in answers] == [200] * 3
         idle(client.app)
+
+
+def test_a_batch_that_is_read_holds_no_bytes_any_more(
+    started: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held, read, write = list[int](), batch.read, batch.Batch.write
+    with started() as client:
+        admission = client.app.state.admission
+
+        def watched_read(*arguments: Any) -> Any:
+            held.append(admission.held_bytes)
+            return read(*arguments)
+
+        def watched_write(*arguments: Any) -> Iterator[bytes]:
+            held.append(admission.held_bytes)
+            yield from write(*arguments)
+
+        monkeypatch.setattr(batch, "read", watched_read)
+        monkeypatch.setattr(batch.Batch, "write", watched_write)
+        body = orjson.dumps({**CASE, "v0": [0.01] * 20_000})
+        assert client.post("/v1/mu-macro/batch", content=body).status_code == 200
+    assert held == [len(body), 0]
+
+
+def test_a_small_batch_that_asks_for_much_is_computed_in_a_thread(
+    started: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slots, write = list[int](), batch.Batch.write
+    with started() as client:
+
+        def watched(*arguments: Any) -> Iterator[bytes]:
+            slots.append(client.app.state.admission.slots)
+            yield from write(*arguments)
+
+        monkeypatch.setattr(batch.Batch, "write", watched)
+        for include, slot in (([], 0), (["settling"], 1)):
+            body = {**CASE, "v0": [0.01] * 2, "contact": "ball", "include": include}
+            assert client.post("/v1/mu-macro/batch", json=body).status_code == 200
+            assert slots.pop() == slot
 
 
 SEARCH = {

@@ -15,6 +15,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from mumacro import Surrogate
+from service import metrics as metrics_of
 from service.metrics import NOW
 from tests.support.cases import CASE, Case
 
@@ -162,6 +163,17 @@ def test_without_room_for_shared_counters_a_worker_has_its_own(
         assert counted in done.stdout.splitlines()
     files = [path.name for path in tmp_path.iterdir()]
     assert (len(files), left.name in files) == (4, False), files
+
+
+def test_a_worker_goes_on_with_the_counts_of_an_earlier_one_of_its_number(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("PROMETHEUS_MULTIPROC_DIR", str(tmp_path))
+    earlier = tmp_path / f"counter_{os.getpid()}.db"
+    earlier.write_bytes(b"counts")
+    metrics_of._reserve()
+    assert earlier.read_bytes() == b"counts"
+    assert len([*tmp_path.iterdir()]) == 4
 
 
 def test_a_slot_is_given_back_when_its_thread_cannot_start_and_counters_need_none(

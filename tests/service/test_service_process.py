@@ -4,6 +4,7 @@ no reader harms."""
 import errno
 import http.client
 import json
+import logging
 import os
 import re
 import signal
@@ -18,6 +19,7 @@ from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -497,3 +499,17 @@ def test_a_service_without_standard_output_serves_and_writes_to_nobody(
         assert process.wait(60) == 0
     finally:
         process.kill()
+
+
+def test_only_a_probe_that_fails_is_told_in_the_log(
+    started: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any
+) -> None:
+    caplog.set_level(logging.INFO, "mumacro")
+    monkeypatch.setattr(LogLines, "running", kept := Mock())
+    with started(tables=(tmp_path,)) as client:
+        for path, status in (("/livez", 200), ("/readyz", 503)):
+            assert client.get(path).status_code == status
+    lines = [call.args[0] for call in kept.put.call_args_list]
+    assert [(line["path"], line["status"], line["level"]) for line in lines] == [
+        ("/readyz", 503, "info")
+    ]

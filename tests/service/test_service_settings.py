@@ -97,6 +97,11 @@ def test_lists_of_settings_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
     assert settings.trusted_proxies == ("10.0.0.0/8", "::1")
 
 
+def test_a_key_that_is_given_twice_keeps_the_name_of_its_holder() -> None:
+    settings = load_settings(api_key="one", api_keys={"alice": "one", "bob": "two"})
+    assert settings.keys() == {"one": "alice", "two": "bob"}
+
+
 def test_a_misspelt_variable_is_noticed(
     started: Any, monkeypatch: pytest.MonkeyPatch, caplog: Any
 ) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
+from service import admission as admissions
 from service.admission import Admission, Ticket
 from service.bodies import read_body
 from service.middleware import HEALTH_PATHS, Entrance
@@ -99,6 +100,27 @@ def test_the_time_limit_is_that_of_all_computations_of_a_request() -> None:
             await ticket.run(lambda: time.sleep(1.2), 1.0, never)
 
     run(main, compute_limit_s=2)
+
+
+def test_long_work_after_short_work_of_a_request_needs_a_slot_of_long_work(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(admissions, "WAIT_S", 0.05)
+
+    async def never() -> Message:
+        await asyncio.Event().wait()
+        raise AssertionError
+
+    async def main(admission: Admission) -> None:
+        ticket = Ticket(scope_of(admission))
+        await ticket.run(lambda: None, 1.0, never)
+        await admission.take("b", True)  # the only one
+        with pytest.raises(RequestError, match="no computation has ended"):
+            await ticket.run(lambda: None, 2.0 * admissions.LONG, never)
+        admission.give_back("b", True)
+        await ticket.run(lambda: None, 2.0 * admissions.LONG, never)
+
+    run(main, max_computations=2)
 
 
 @pytest.mark.parametrize("path", sorted(HEALTH_PATHS))

@@ -239,6 +239,31 @@ def test_the_extremes_are_those_of_a_dense_sampling(table: Surrogate, pair: Any)
         )
 
 
+@every_pair
+def test_an_answer_at_rest_says_that_it_is_the_static_limit(table: Surrogate, pair: Any) -> None:
+    words, _, case = as_kind({**CASE, "v0": 0.0}, pair)
+    one = table.evaluate(case, **words)
+    many = table.evaluate({**case, "v0": np.array([0.0, 0.01])}, **words)
+    assert one.source == many.source[0] == "static_limit" != many.source[1]
+
+
+@every_pair
+@pytest.mark.parametrize("factor", [3.0, 10.0, 30.0])
+def test_the_bound_of_an_interval_covers_its_ends_and_its_middle(
+    table: Surrogate, pair: Any, factor: float
+) -> None:
+    words, _, case = as_kind(CASE, pair)
+    for middle in (0.1 * case["k"], case["k"]):
+        k = np.array([middle / factor, middle, middle * factor])
+        largest = table.evaluate(**{**case, "k": k}, **words).error_bound.max()
+        rest = without(case, "k")
+        one = table.evaluate(k_low=k[0], k_high=k[2], **rest, **words)
+        many = table.evaluate(k_low=k[:1], k_high=k[2:], **rest, **words)
+        # the middle is off by a digit, which may change its bound by a share
+        assert one.error_bound >= (1.0 - 1e-4) * largest
+        assert many.error_bound.tolist() == [one.error_bound]
+
+
 @pytest.mark.parametrize("pair", PAIRS[:2], ids=" ".join)
 @pytest.mark.parametrize("ratio", [10.5, 11.9, 12.1, 20.0, 300.0, 3e4])
 def test_extremes_inside(table: Surrogate, pair: Any, ratio: Any) -> None:

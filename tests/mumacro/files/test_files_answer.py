@@ -337,3 +337,14 @@ def test_a_double_that_is_too_large_in_si_is_rejected_and_no_rigid_contact(
     }
     _, rejects = answer(pa.RecordBatch.from_pydict(columns), surrogate)
     assert [(one["row"], one["reason"]) for one in rejects.to_pylist()] == [(1, BEYOND)]
+
+
+def test_an_output_that_a_case_does_not_have_is_null() -> None:
+    case = {"mu0": [0.3] * 3, "Fz": [10.0] * 3, "k": ["rigid", "1e6", "rigid"]}
+    case |= {"y0": [2e-6] * 3, "f": [2e4] * 3, "v0": [0.01, 0.01, -1.0]}
+    answered, _ = answer(pa.RecordBatch.from_pydict(case), include=["power"])
+    power, saved = (
+        answered.column(f"power.{name}").to_pylist() for name in ("oscillation", "saved")
+    )
+    assert [x is None for x in power] == [True, False, True]
+    assert [x is None for x in saved] == [False, False, True]
