@@ -31,7 +31,7 @@ from fastapi import Request
 from starlette.requests import ClientDisconnect
 from starlette.types import Receive, Scope
 
-from mumacro.kernel.stopping import Stop, StopError
+from mumacro.kernel.threads import Stop, StopError
 
 from .problems import TICKET, ProblemKind, RequestError, path_in
 from .settings import Settings

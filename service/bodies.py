@@ -140,7 +140,7 @@ def members_of(query: bytes) -> dict[str, Any]:
     texts."""
     members: dict[str, Any] = {}
     repeats: dict[str, None] = {}
-    for name, value in _pairs(query):
+    for name, value in _pairs(query) if query else ():
         if name in _LISTS:
             members.setdefault(name, []).extend(part.strip() for part in value.split(","))
         elif name in members:

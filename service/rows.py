@@ -32,7 +32,7 @@ from mumacro.inputs.fields import (
 )
 from mumacro.inputs.names import unknown_name
 from mumacro.kernel.arrays import Array
-from mumacro.kernel.stopping import look
+from mumacro.kernel.threads import look
 
 from .models.inputs import INPUTS, MAX_REASONS, entry
 from .models.options import Case

@@ -16,7 +16,7 @@ from typing import Annotated, Any, TypeVar
 from fastapi import Query, Request, Response
 from starlette.types import Receive, Scope, Send
 
-from mumacro.kernel.stopping import look
+from mumacro.kernel.threads import look
 
 from ..admission import AT_ONCE, LONG, Ticket, ticket_of
 from ..batch import MORE_CASES, Batch, costs_of_reading

@@ -39,8 +39,8 @@ from mumacro.inputs.fields import (
     OneInterval,
     kind_of,
 )
+from mumacro.kernel import threads as slices
 from mumacro.kernel.arrays import Array, common_shape, flat
-from mumacro.kernel.threads import default_threads
 from mumacro.outputs import evaluation
 from mumacro.outputs.answer import Answer
 from mumacro.outputs.entry import Output
@@ -237,7 +237,7 @@ class Surrogate:
     def threads(self) -> int:
         """Return how many threads a call from here uses for a large array."""
         limit = self.tabulated.threads
-        return default_threads() if limit is None else limit
+        return slices.default_threads() if limit is None else limit
 
     @property
     def id(self) -> str:
@@ -691,7 +691,9 @@ class Surrogate:
         columns = [x if type(x) is np.ndarray else float(x) for x in six]
         if names is _SIX_WITH_F:
             columns[4] = angular(columns[4])
-        rows = self.tabulated.many(columns, shape, "values", kind)
+        tabulated = self.tabulated
+        data = tabulated.data(kind=kind)
+        rows = slices.cases(data, columns, shape, tabulated.threads, "values", kind)
         numbers = rows.mu_macro, rows.mu_ratio, rows.error_bound
         answer = Answer(*numbers, rows.source, None, None, self)
         answer._plain = kind, names, six

@@ -19,7 +19,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mumacro
-from mumacro.kernel.stopping import StopError, current
+from mumacro.kernel.threads import STOP, StopError
 from service import admission as admissions
 from service import batch, tables
 from service.admission import Admission
@@ -183,7 +183,7 @@ def test_a_computation_beyond_its_limit_is_ended_and_gives_its_slot_back(
     ended = threading.Event()
 
     def slow_motion(**_: Any) -> Any:
-        stop = current()
+        stop = STOP.get()
         try:
             while True:
                 stop.look()

@@ -21,7 +21,7 @@ from mumacro.inputs.columns import to_si
 from mumacro.inputs.fields import Numbers, kind_of
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.kernel.binding import kernels
-from mumacro.kernel.stopping import look
+from mumacro.kernel.threads import look
 from mumacro.results import NOTE, Note
 
 LEAST, MOST = 6, 50_000  # samples of a loop

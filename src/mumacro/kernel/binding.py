@@ -163,13 +163,8 @@ class CaseRows:
     #: bounds of the absolute errors of the gradient
     gradient_bound = _Rows("MU_ROW_GRADIENT_BOUND", "MU_ROWS")
 
-    def __init__(self, numbers: Array, source: Codes) -> None:
-        self.numbers, self.source = numbers, source
-
-    @classmethod
-    def empty(cls, shape: tuple[int, ...], detail: Detail = "values") -> Self:
-        """Return empty arrays for the answers to cases of a shape."""
-        return cls(np.empty((_END[detail], *shape)), np.empty(shape, np.int8))
+    def __init__(self, shape: tuple[int, ...], detail: Detail = "values") -> None:
+        self.numbers, self.source = np.empty((_END[detail], *shape)), np.empty(shape, np.int8)
 
 
 class SlopeRows(NamedTuple):

@@ -1,20 +1,31 @@
-"""Cut arrays into slices and evaluate them, one after another or on several threads.
+"""Cut arrays into slices and evaluate them, one after another or on several threads; let another
+thread end a computation.
 
 The kernel releases the interpreter's lock, so several threads can work at once.  They end with the
-call, so that a process can be forked and no call waits for another.
+call, so that a process can be forked and no call waits for another.  A computation checks a flag
+between its pieces of work, and the kernel checks it at every step of a motion.
+
+>>> stop = Stop()
+>>> with stop.of_this_thread():
+...     look()
+...     stop.set()
+...     look()
+Traceback (most recent call last):
+mumacro.kernel.threads.StopError: the computation was ended
 """
 
 import functools
 import os
 import threading
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 
 import numpy as np
 
+from mumacro.errors import MumacroError
 from mumacro.kernel.arrays import Array, Codes
 from mumacro.kernel.binding import CaseRows, Data, Detail, ExtremeRows, SlopeRows, kernels
-from mumacro.kernel.stopping import current
 
 SLICE = 16_384  # points in a slice, so that its arrays stay in the second-level cache
 ONE_THREAD = 65_536  # points that one thread evaluates while a second thread starts
@@ -23,6 +34,50 @@ ALONG_COST = 64
 # approximate time of a case with an interval of k, divided by that of a case with one k
 INTERVAL = 64
 _KERNEL = kernels[-1]
+
+
+# --- the end of a computation ---------------------------------------------------------------------
+
+
+class StopError(MumacroError):
+    """Report that another thread ended the computation."""
+
+
+class Stop:
+    """Hold a flag; once it is set, every computation that checks it ends."""
+
+    def __init__(self) -> None:
+        self.flag = np.zeros(1, np.int32)  # the kernel reads it, too
+
+    def set(self) -> None:
+        """Ask the computations that check this flag to end."""
+        self.flag[0] = 1
+
+    def look(self) -> None:
+        """Raise StopError if the flag is set."""
+        if self.flag[0]:
+            raise StopError("the computation was ended")
+
+    @contextmanager
+    def of_this_thread(self) -> Iterator[None]:
+        """Let the computations of this thread check the flag, until the context ends."""
+        token = STOP.set(self)
+        try:
+            yield
+        finally:
+            STOP.reset(token)
+
+
+#: the flag that computations of this thread check
+STOP = ContextVar("mumacro.stop", default=Stop())  # noqa: B039  (never set)
+
+
+def look() -> None:
+    """Raise StopError if the computation of this thread must end."""
+    STOP.get().look()
+
+
+# --- slices ---------------------------------------------------------------------------------------
 
 
 def _cost(kind: tuple[int, int]) -> int:
@@ -65,7 +120,7 @@ def default_threads() -> int:
 def share_out(n: int, threads: int | None, work: Callable[[slice], None], cost: int = 1) -> None:
     """Call ``work`` with every slice of n points.  A point takes about ``cost`` times as long as a
     point of one spring.  The default of ``threads`` is :func:`default_threads`."""
-    length, stop = SLICE // cost, current()
+    length, stop = SLICE // cost, STOP.get()
     stop.look()
     if n <= length:
         work(slice(0, n))
@@ -144,7 +199,7 @@ def cases(
     kind: tuple[int, int] = (0, 0),
 ) -> CaseRows:
     """Return answers to cases of a shape, see :meth:`mumacro.kernel.binding.Kernel.cases`."""
-    answers = CaseRows.empty(shape, detail)
+    answers = CaseRows(shape, detail)
     share_out(
         answers.source.size,
         threads,

@@ -20,8 +20,7 @@ from mumacro.inputs.doubts import remarks_on_motion
 from mumacro.inputs.fields import BOUNDS, RAD_PER_CYCLE, STIFFNESS, Numbers, Oscillation, kind_of
 from mumacro.kernel.arrays import Array, Bools, common_shape, flat
 from mumacro.kernel.binding import kernels
-from mumacro.kernel.stopping import current, look
-from mumacro.kernel.threads import share_out
+from mumacro.kernel.threads import STOP, look, share_out
 from mumacro.motions.oscillation import read_oscillation
 from mumacro.results import WARNING, Note, Result, Rows, cell
 
@@ -174,7 +173,7 @@ class Motion(Result):
             shares, weights = 1.5 * a**2 * (2.0 - a**2), halves * a
         case = scenes.dimensionless[i].copy()
         forces = _KERNEL.motion_cycle(
-            scenes.orders, case, shares, weights, scenes.tolerance, points, current().flag
+            scenes.orders, case, shares, weights, scenes.tolerance, points, STOP.get().flag
         )
         look()
         mu0, Fz, _, omega, v0 = (float(column[i]) for column in scenes.columns.values())
@@ -457,7 +456,7 @@ def _steady(scenes: Scenes, legal: Bools, threads: int | None) -> Array:
     """Return the rows of the kernel for the legal cases."""
     cases = np.ascontiguousarray(scenes.dimensionless[legal])
     out = np.empty((cases.shape[0], 7))
-    ball, stop = int(scenes.contact == "ball"), current()
+    ball, stop = int(scenes.contact == "ball"), STOP.get()
 
     def work(part: slice) -> None:
         _KERNEL.motions(ball, scenes.orders, cases[part], scenes.tolerance, out[part], stop.flag)

@@ -127,12 +127,8 @@ class Tabulated:
     def rows(self, cases: Cases, detail: Detail = "values") -> CaseRows:
         """Return the answers to cases of one contact and direction, in their shape, (1,) for one
         case."""
-        return self.many([*cases.columns.values()], cases.shape or (1,), detail, cases.kind)
-
-    def many(
-        self, six: Sequence[Array | float], shape: tuple[int, ...], detail: Detail, kind: Kind
-    ) -> CaseRows:
-        """Return answers to cases of one kind and shape, in columns of the six inputs."""
+        six, kind = [*cases.columns.values()], cases.kind
+        shape = cases.shape or (1,)
         return slices.cases(self.data(kind=kind), six, shape, self.threads, detail, kind)
 
     def extremes(self, cases: Cases) -> ExtremeRows:

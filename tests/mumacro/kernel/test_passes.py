@@ -211,7 +211,7 @@ def test_contacts_and_directions_have_the_same_bits(
 
     def numbers_of(kernel: Kernel, part: slice) -> list[Any]:
         columns = [np.ascontiguousarray(column[part]) for column in six]
-        answers = CaseRows.empty(columns[0].shape, "gradient")
+        answers = CaseRows(columns[0].shape, "gradient")
         kernel.cases(data, columns, answers, slice(0, columns[0].size), kind)
         return [answers.numbers, answers.source]
 

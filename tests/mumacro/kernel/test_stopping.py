@@ -9,8 +9,7 @@ import pytest
 
 import mumacro
 from mumacro.kernel.binding import kernels
-from mumacro.kernel.stopping import Stop, StopError
-from mumacro.kernel.threads import share_out
+from mumacro.kernel.threads import Stop, StopError, share_out
 from tests.support.cases import CASE, opened
 
 SWEPT = {name: x for name, x in CASE.items() if name != "v0"}

@@ -14,7 +14,7 @@ from mumacro import Element, Motion, Surrogate, motion, solve_motion
 from mumacro.cli.main import main
 from mumacro.cli.motion import EXAMPLE
 from mumacro.kernel.binding import Kernel
-from mumacro.kernel.stopping import Stop, StopError
+from mumacro.kernel.threads import Stop, StopError
 from mumacro.motions.motion import SLOWEST
 from tests.support.cases import Array, Capture
 from tests.support.comparing import close
