@@ -226,7 +226,7 @@ def on_any_processor(table: Surrogate, share: float) -> Count:
     for n, _, cases in pieces(N // 5, share):
         rows = []
         for kernel in (kernels[-1], kernels[0]):
-            answers = CaseRows.empty((n,))
+            answers = CaseRows((n,))
             kernel.cases(table.tabulated.data(), list(cases.values()), answers, slice(0, n))
             rows.append(answers)
         here, there = rows
