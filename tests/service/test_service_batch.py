@@ -64,6 +64,18 @@ def test_the_list_of_errors_is_bounded_and_their_number_is_given(client: Any, ca
     assert answer["groups"]["l0"][:9000] == answer["regime"][:9000] == [None] * 9000
 
 
+@pytest.mark.parametrize("f", [-1.0, 2.9e307, 1e308])
+def test_a_frequency_of_all_cases_is_refused_as_that_of_one(
+    client: Any, problem: Any, case: Case, f: float
+) -> None:
+    """2 pi f must be a number, too."""
+    rest = {name: x for name, x in case.items() if name != "omega"} | {"f": f}
+    alone = problem(client.post("/v1/mu-macro", json=rest), 422)
+    whole = problem(client.post(BATCH, json={**rest, "v0": [0.01, 0.02]}), 422)
+    assert whole["errors"] == alone["errors"]
+    assert [fault["pointer"] for fault in whole["errors"]] == ["#/f"]
+
+
 TEXTS = ["10 cm/s", "0.1", "rigid", "", "0.1 ± 0.01", "0.1..0.2 m/s"]
 
 
