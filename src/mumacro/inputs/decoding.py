@@ -168,10 +168,6 @@ class Text:
             text = self._decoder.decode(data, final)
         except UnicodeDecodeError as error:
             text = self._in_windows_1252(error, final)
-        except UnicodeError:  # of UTF-16 and UTF-32, which a caller has named
-            name = NAMES.get(self.encoding, self.encoding)
-            remedy = f"give {self.encoding}-le or {self.encoding}-be, or another encoding"
-            raise TextError(f"it does not begin like {name}: {remedy}") from None
         self._ascii = self._ascii and text.isascii()
         text = self._line_ends.decode(text, final)
         if "\0" in text:
@@ -197,6 +193,9 @@ class Text:
             f"{codec_of_mark}-be",
         ):
             self.encoding = codec_of_mark
+        if data and self.encoding in ("utf-16", "utf-32") and self.encoding != codec_of_mark:
+            remedy = f"give {self.encoding}-le or {self.encoding}-be, or another encoding"
+            raise TextError(f"it does not begin like {NAMES[self.encoding]}: {remedy}")
         return codecs.getincrementaldecoder(self.encoding)("strict")
 
     def _in_windows_1252(self, error: UnicodeDecodeError, final: bool) -> str:

@@ -57,7 +57,7 @@ def _parts(name: str, value: Any) -> list[tuple[Any, Any, Any]]:
         return _of_text(name, value)
     if isinstance(value, Mapping):
         return [_of_mapping(name, value)]
-    triples = isinstance(value, tuple) and value != () and all(map(_is_term, value))
+    triples = isinstance(value, tuple) and all(map(_is_term, value))
     if isinstance(value, tuple) and not triples:
         if len(value) != 2:
             _refuse_samples(name, value)

@@ -316,11 +316,16 @@ def test_one_case_has_the_remarks_of_a_column_of_one(
     assert remarks(case) == remarks({**case, "k": np.array([k])})
 
 
-@pytest.mark.parametrize("name", ["mu0", "Fz", "k", "y0", "omega", "v0"])
-@pytest.mark.parametrize("value", [-1.0, -0.0, 0.0, -math.inf, math.inf, math.nan])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        (name, value)
+        for name in ("mu0", "Fz", "k", "y0", "omega", "v0")
+        for value in (-1.0, -0.0, 0.0, -math.inf, math.inf, math.nan)
+        if (name, value) != ("k", math.inf)  # a rigid contact is legal
+    ],
+)
 def test_what_is_not_legal_is_not_doubted(name: str, value: float) -> None:
-    if (name, value) == ("k", math.inf):
-        pytest.skip("a rigid contact is legal")
     found = remarks({**CASE, name: np.array([CASE[name], value])})
     still = value == 0.0 and name in ("y0", "omega")  # legal, and it needs no model
     assert [one.row for one in found] == ["model"] * still
