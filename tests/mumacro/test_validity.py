@@ -201,3 +201,15 @@ def test_what_is_said_of_an_evaluated_case_takes_no_second_evaluation(
     monkeypatch.delattr(Cases, "of")
     assert (rows_of(evaluated), effect_of(evaluated)) == expected
     assert evaluated._repr_html_()
+
+
+@pytest.mark.parametrize("direction", ["along", "normal"])
+def test_a_cycle_across_is_not_said_of_another_direction(
+    surrogate: Surrogate, direction: str
+) -> None:
+    case = {**CASE, "v0": 1e-6, "k": 1.3e7, "y0": 5e-6}
+    words = {"direction": direction}
+    if direction == "normal":
+        case = {name: x for name, x in case.items() if name != "y0"} | {"Fz_amplitude": 3.0}
+    told = {row["row"] for row in rows_of(surrogate.evaluate({**case, **words}))}
+    assert not told & {"steady cycle", "Coulomb friction", "no wear, no heating"}
