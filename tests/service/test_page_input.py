@@ -238,7 +238,7 @@ def test_the_ways_to_k_stand_below_its_field(open_page: Any) -> None:
     assert page.text(".ways").strip().startswith("Find k: ")
     for width in (320, 768, 1280, 1920):
         page = open_page(width=width, height=800)
-        assert len({one["y"] for one in page.rects(".ways > *")}) == 1, width
+        assert len({one["y"] for one in page.rects(".field .ways > *")}) == 1, width
 
 
 def test_a_ball_whose_load_oscillates_cannot_be_chosen(open_page: Any) -> None:
