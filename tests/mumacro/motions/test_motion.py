@@ -615,7 +615,7 @@ WRONG: tuple[tuple[dict[str, Any], str, str], ...] = (
     ({"y": "0.5 um with 90 degrees"}, "y", "did you mean 0.5um@90degrees?"),
     ({"y": "2e-6,90"}, "y", "did you mean 2e-6@90deg?"),
     ({"y": None}, "y, amplitude", "real number"),
-    *(({name: (1e-6,) * n}, name, "a pair") for name in ("x", "y", "normal") for n in (0, 1, 3, 4)),
+    *(({name: (1e-6,) * n}, name, "a pair") for name in ("x", "y", "normal") for n in (1, 3, 4)),
     ({"normal": 3.0, "contact": "ball"}, "normal", "contact radius"),
     ({"contact": "cube"}, "contact", "spring, ball"),
     ({"omega": 1e5}, "omega", "exactly one"),
