@@ -20,7 +20,7 @@ from pydantic_core import InitErrorDetails
 from mumacro.errors import InputError
 from mumacro.inputs.case import no_number, read_one, reason_of
 from mumacro.inputs.cells import THOUSANDS
-from mumacro.inputs.fields import AMPLITUDE, MOST_HZ, QUANTITY_OF, STIFFNESS, described
+from mumacro.inputs.fields import MOST_HZ, QUANTITY_OF, STIFFNESS, described
 from mumacro.inputs.layout import SEPARATORS, Dialect
 from mumacro.motions.motion import PARTS
 from mumacro.motions.solve_motion import UNKNOWNS
@@ -362,7 +362,7 @@ class FitRequest(Choice):
         for name in self.unknowns:
             if getattr(self, name) is not None:
                 raise InputError(name, None, "left out: it is among the unknowns")
-        other = "y0" if self.kind.normal else AMPLITUDE
+        other = self.kind.other_amplitude
         if getattr(self, other) is not None:
             raise InputError(other, None, f"left out for direction {self.direction}")
         if self.points is not None and self.points_base64 is not None:

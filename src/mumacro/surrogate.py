@@ -201,11 +201,7 @@ class Surrogate:
         """Return the regime at each v~ (n,) and y~ (n,)."""
         # v~ = v0 and y~ = y0
         cases = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": v}
-        return np.asarray(
-            self.evaluate(
-                {**cases, "Fz_amplitude" if kind.normal else "y0": y}, **kind.names
-            ).regime
-        )
+        return np.asarray(self.evaluate({**cases, kind.amplitude: y}, **kind.names).regime)
 
     def reverse_slip_on_map(self, kind: Kind, width: int) -> tuple[Array, Array] | None:
         """Return (v~, y~) of the border between stick-slip and reverse slip on the map, (n,) each

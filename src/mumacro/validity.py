@@ -19,7 +19,6 @@ import numpy as np
 from mumacro.errors import InputError
 from mumacro.inputs.doubts import FURTHEST, UNITS
 from mumacro.inputs.fields import (
-    AMPLITUDE,
     MEASURED_AS,
     PER_UNIT,
     RAD_PER_CYCLE,
@@ -111,7 +110,7 @@ def rows_of(answer: Answer[float], effect: float | None = None) -> list[Row]:
 def _is_elastic(answer: Answer[float]) -> bool:
     """Return whether a contact is elastic and shaken."""
     inputs = answer.cases.columns
-    swing = inputs[AMPLITUDE if answer.cases.kind.normal else "y0"]
+    swing = inputs[answer.cases.kind.amplitude]
     return not (math.isinf(inputs["k"]) or inputs["omega"] == 0.0 or swing == 0.0)
 
 

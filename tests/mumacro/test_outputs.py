@@ -16,6 +16,7 @@ from mumacro.motions.element import Element
 from mumacro.motions.motion import motion
 from mumacro.outputs import MEMBERS, OUTPUTS
 from mumacro.outputs.answer import TEXTS
+from mumacro.outputs.evaluation import chosen
 from tests.support.cases import CASE, Case, as_kind, flat, tables, without
 from tests.support.comparing import close
 from tests.support.refusals import refused
@@ -215,6 +216,13 @@ def test_outputs_are_found_by_their_path_or_as_a_whole(table: Surrogate) -> None
         == answer.paths
         == [*table.evaluate({**CASE, "v0": [0.01]}, include="groups, power").to_frame()]
     )
+
+
+def test_a_choice_of_outputs_is_kept_once_however_often_their_names_are_said() -> None:
+    one = Cases.of(CASE)
+    kept = chosen(("power", "limits"), one)
+    assert [output.name for output in kept] == ["limits", "power"]
+    assert chosen(["limits", *["power"] * 1000], one) is kept
 
 
 @pytest.mark.parametrize("include", [(), "groups", "power"])

@@ -116,7 +116,7 @@ class Answer(Result, Generic[Number]):
         self._plain: tuple[Kind, tuple[str, ...], tuple[Any, ...]]
         self._surrogate = surrogate
         self.gradient = self.gradient_bound = None
-        self.outputs: dict[str, Any] = _NOTHING
+        self.outputs: Mapping[str, Any] = _NOTHING
         #: where an output is missing or doubtful
         self.notes_on_outputs: list[Note] = []
 
@@ -278,7 +278,7 @@ class Answer(Result, Generic[Number]):
             with np.errstate(all="ignore"):
                 low, high = (np.broadcast_to(np.ravel(end), v.size) / k for end in cases.ends)
             ends = low, high
-        amplitude = AMPLITUDE if cases.kind.normal else "y0"
+        amplitude = cases.kind.amplitude
         return plotting.Marks(
             v,
             y,
@@ -299,7 +299,7 @@ class Answer(Result, Generic[Number]):
         >>> answer.to_frame()["regime"].tolist()
         ['static', 'stick_slip']
         """
-        return {path: getattr(self, path) for path in self._always} | self.outputs
+        return {**{path: getattr(self, path) for path in self._always}, **self.outputs}
 
     def _members(self) -> dict[str, Any]:
         """Return the JSON of one case: ``power.saved`` is ``saved`` within ``power``.

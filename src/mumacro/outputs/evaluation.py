@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from functools import cache, lru_cache
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -55,12 +55,14 @@ def chosen(
     names = () if type(include) is tuple and not include else names_in(include)
     if not names and not gradient and not cases.std:
         return ()
-    return _chosen((*names,), bool(gradient), cases.kind, bool(cases.std), cases.ends is not None)
+    return _chosen(
+        frozenset(names), bool(gradient), cases.kind, bool(cases.std), cases.ends is not None
+    )
 
 
-@lru_cache(512)
+@cache
 def _chosen(
-    names: tuple[str, ...], gradient: bool, kind: Kind, deviations: bool, interval: bool
+    names: frozenset[str], gradient: bool, kind: Kind, deviations: bool, interval: bool
 ) -> tuple[Output, ...]:
     """Return the same from the properties of the cases on which it depends."""
     if "std" in names and not deviations:

@@ -36,7 +36,7 @@ def power(cases: Evaluated) -> Values:
     for product in (mu0, force, length, rate, unit, shaker):
         plain = plain & (product > _LEAST) & (product < _MOST)
     values = [shaker, saved, shaker_bound, saved_bound]
-    if not (plain if plain is True else np.all(plain)):
+    if not (plain.all() if isinstance(plain, np.ndarray) else plain):
         here = np.flatnonzero(~np.broadcast_to(plain, np.size(cases.mu_ratio)))
         for i, whole in enumerate(_at_the_ends(cases, here, v, y, number, bound)):
             column = np.array(np.broadcast_to(values[i], np.size(cases.mu_ratio)))

@@ -204,8 +204,9 @@ def solve_for(
     kind, (name, _) = kind_of(contact, direction), field_of(unknown)
     within = None if within is None else _ends(unknown, within)
     remaining, stiffening = stiffening_of(case, name, kind, stiffness_exponent)
-    for deviation in (name for name in DEVIATIONS if case.get(name) is not None):
-        raise InputError(deviation, case[deviation], NO_DEVIATION)
+    for deviation in DEVIATIONS:
+        if case.get(deviation) is not None:
+            raise InputError(deviation, case[deviation], NO_DEVIATION)
     one, levels = case_around(remaining, unknown, kind), _levels(target)
     for input_ in one.std:
         written = "f" if input_ == "omega" and one.f is not None else input_
@@ -320,7 +321,7 @@ def _default_range(curve: InputCurve, targets: Array) -> tuple[float, float]:
 def _soft_to_rigid(curve: InputCurve, targets: Array, least: float) -> tuple[float, float]:
     """Return the range for k, Fz and mu0; ``least`` is the smallest legal value."""
     case, unknown = curve.case, curve.unknown
-    amplitude = case[AMPLITUDE if curve.kind.normal else "y0"]
+    amplitude = case[curve.kind.amplitude]
     if 0.0 in (amplitude, case["omega"]) or curve.proportional:
         return max(least, 1e-300), 1e300
     if unknown == "Fz" and curve.kind.normal:
