@@ -43,7 +43,12 @@ def power(cases: Evaluated) -> Values:
             kept = np.isnan(whole) | (i in (1, 3)) & np.broadcast_to(driven, column.size)[here]
             column[here] = np.where(kept, column[here], whole)
             values[i] = column if cases.cases.shape else float(column[0])
-    return dict(zip(POWER.members, values, strict=True))
+    return {
+        "power.oscillation": values[0],
+        "power.saved": values[1],
+        "power_bound.oscillation": values[2],
+        "power_bound.saved": values[3],
+    }
 
 
 def _at_the_ends(cases: Evaluated, here: Any, *of_table: Any) -> tuple[Array, Array, Array, Array]:
