@@ -24,7 +24,7 @@ from mumacro.outputs.evaluation import chosen, cost
 from mumacro.results import Note, add
 
 from .bodies import of_members
-from .json_text import NotRead, decode_batch, dump
+from .json_text import NotRead, decode_batch, dump, words
 from .models.inputs import MAX_REASONS
 from .models.options import OF_ONE_CASE, CaseColumns
 from .problems import FieldFault, ProblemKind, RequestError, reason_of, refuse
@@ -228,9 +228,7 @@ class Batch:
         for path, before in zip(parts[0], layout, strict=False):
             opening = before + b"["
             for part in parts:
-                column = part[path]
-                if path in TEXTS:  # an empty text is written as null
-                    column = [word or None for word in column.tolist()]
+                column = words(part[path]) if path in TEXTS else part[path]
                 yield opening + dump(column)[1:-1]
                 opening = b","
             yield b"]"

@@ -118,6 +118,11 @@ def decode_batch(text: bytearray) -> Any:
 dump = partial(orjson.dumps, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
+def words(column: Any) -> list[str | None]:
+    """Return an array of texts as JSON has it: an empty text is null."""
+    return [word or None for word in column.tolist()]
+
+
 class Json(Response):
     """Send an answer as JSON. Starlette's own class completes the headers, which takes as long as a
     case."""

@@ -24,7 +24,7 @@ from mumacro.questions.solve_for import TableSolution
 from .. import API_VERSION
 from ..admission import compute
 from ..bodies import understood_in
-from ..json_text import Json
+from ..json_text import Json, words
 from ..models.answers import LawAnswer, SolveForAnswer, SolveMotionAnswer
 from ..models.motion import MOTIONS_OF_A_SEARCH, cost_of
 from ..models.options import MODEL
@@ -58,9 +58,10 @@ def _law(question: LawRequest, table: LoadedTable) -> tuple[Law, dict[str, list[
     )
     cases = law.answer.cases
     answer = table.surrogate.answer(cases, chosen(question.outputs, cases))
-    columns = {path: column.tolist() for path, column in answer.columns.items()}
-    for path in TEXTS:  # an empty text is written as null
-        columns[path] = [word or None for word in columns[path]]
+    columns = {
+        path: words(column) if path in TEXTS else column.tolist()
+        for path, column in answer.columns.items()
+    }
     columns["mu_static"] = law.mu_static.tolist()
     if law.stiffening is not None:
         columns["k"] = law.inputs["k"].tolist()

@@ -5,6 +5,7 @@ import io
 import json
 import math
 from base64 import b64encode
+from gzip import compress
 from pathlib import Path
 from typing import Any
 
@@ -270,6 +271,7 @@ def test_pasted_points_are_read_without_a_fit(client: Any) -> None:
         ({"points": "v0,mu_macro\n" + "1,0.2\n" * 1001}, "#/points", ("line 1002", "1,000")),
         ({"points_base64": "no base64!"}, "#/points_base64", ("base64",)),
         ({"points_base64": b64encode(b"PK\x03\x04").decode()}, "#/points_base64", ("as CSV",)),
+        ({"points_base64": b64encode(compress(b"v0")).decode()}, "#/points_base64", ("unpack it",)),
         ({"points_base64": b64encode(b"\0" * 99).decode()}, "#/points_base64", ("zero byte",)),
         ({"points": "a", "points_base64": "YQ=="}, "#/points_base64", ("points",)),
         ({"points": "v0,mu_macro\n1,0.2\n", "v0": [1.0]}, "#/v0", ("given once",)),

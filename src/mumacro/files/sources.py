@@ -254,6 +254,7 @@ def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] |
         or not inputs
         or account.open
         or account.name in text
+        or "\n\n" in text  # an empty line has no number
         or (shows_signs and not table.signs.decimal)
         or ('"' in text and not _quotes_surround_cells(text, sep))
     ):

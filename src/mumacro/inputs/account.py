@@ -169,6 +169,8 @@ class Account:
         lines = list[int]()
         rows = Rows(self.sep, [], lines, {}, [])
         for number, line in enumerate(piece.lines, piece.first):
+            if not line and not self.open:  # there may be millions
+                continue
             if self.header.sep == BLANKS:
                 cells = _BETWEEN_BLANKS.findall(line) if '"' in line else line.split()
                 line = self.sep.join(cells)

@@ -24,6 +24,8 @@ from mumacro.inputs.units import (
 
 # units of rotation: without one of them 1/s is a frequency, with one of them it is not
 _ANGLES = ("rad", "deg", "°", "turn", "rev", "cycle", "rpm", "arc")
+#: names of an attribute with the unit
+_NAMES = ("units", "unit", "Units", "Unit")
 # values of these never have a unit
 _PLAIN = ("builtins", "numpy", "polars", "pyarrow", "dask")
 
@@ -36,8 +38,8 @@ def library(value: Any) -> str:
 def carried_unit(value: Any) -> Any:
     """Return the unit of a value, as an object of its library or a text, or None if it has no unit.
 
-    ``attrs`` of xarray, pandas, h5py and netCDF4 have it under the name ``units`` or ``unit``;
-    ``attrs`` of a frame have it under the name of the column.
+    ``attrs`` of xarray, pandas and h5py have it under one of :data:`_NAMES`; ``attrs`` of a frame
+    have it under the name of the column.
 
     >>> carried_unit(2.0) is None
     True
@@ -54,7 +56,7 @@ def carried_unit(value: Any) -> Any:
     if unit is None:
         attributes: Any = getattr(value, "attrs", None)
         if hasattr(attributes, "get"):
-            unit = attributes.get("units", attributes.get("unit"))
+            unit = next((attributes[name] for name in _NAMES if name in attributes), None)
             if isinstance(unit, Mapping):  # the attrs of a frame
                 unit = unit.get(getattr(value, "name", None))
     if isinstance(unit, np.ndarray) and unit.size == 1:
@@ -69,15 +71,16 @@ def units_of_fields(schema: Any) -> dict[str, str]:
     units = {}
     for field in schema:
         metadata = field.metadata or {}
-        unit = metadata.get(b"units", metadata.get(b"unit", b"")).decode("utf-8", "replace")
-        if unit.strip():
-            units[field.name] = unit.strip()
+        found = [metadata[name.encode()] for name in _NAMES if name.encode() in metadata]
+        unit = found[0].decode("utf-8", "replace").strip() if found else ""
+        if unit:
+            units[field.name] = unit
     return units
 
 
 def _unit_of_quantity(value: Any) -> Any:
     """Return the unit of a quantity of pint, astropy, unyt or a similar library."""
-    for attribute in ("units", "unit"):
+    for attribute in _NAMES:
         unit = getattr(value, attribute, None)
         # a logarithmic unit of astropy can be called, too
         if unit is not None and not inspect.isroutine(unit) and unit is not value:

@@ -192,7 +192,7 @@ class Cases(NamedTuple):
         """Return why the case at ``index`` has no answer."""
         for name, faults in self.faults.items():
             if fault := faults.get(index):
-                return InputError(name, fault.entry, fault.reason.removeprefix("must be "))
+                return InputError(name, fault.entry, fault.bound)
 
         def pick(x: Any) -> float:
             return float(x[index] if isinstance(x, np.ndarray) else x)

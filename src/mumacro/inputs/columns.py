@@ -60,6 +60,13 @@ class Fault(NamedTuple):
     entry: object
     reason: str
 
+    @property
+    def bound(self) -> str:
+        """Return what the entry must be, as part of an error."""
+        if self.reason.startswith("is missing"):
+            return f"a real number: it {self.reason}"
+        return self.reason.removeprefix("must be ")
+
 
 class Column(NamedTuple):
     """Hold a column as it was understood."""
@@ -168,11 +175,7 @@ def to_si(name: str, value: Any, quantity: str = "") -> Any:
 def refuse_gaps(name: str, column: Column) -> None:
     """Raise InputError for the first gap of a column, with its place."""
     for place, fault in column.faults.items():
-        gap = fault.reason.startswith("is missing")
-        bound = (
-            f"a real number: it {fault.reason}" if gap else fault.reason.removeprefix("must be ")
-        )
-        raise InputError(name, fault.entry, bound, place)
+        raise InputError(name, fault.entry, fault.bound, place)
 
 
 def in_unit(name: str, value: Any, unit: str) -> Any:

@@ -28,12 +28,13 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
+_GZIP = b"\x1f\x8b"
 # files that are not tables as text, by their first bytes
 _OTHERS = (
     (b"PK\x03\x04", "is a workbook (.xlsx) or another zip file; save its table as CSV"),
     (b"\xd0\xcf\x11\xe0", "is a workbook of old Excel (.xls); save it as .xlsx or as CSV"),
-    (b"\x1f\x8b", "is compressed; name it .gz, or unpack it"),
-    (b"PAR1", "is Parquet; name it .parquet"),
+    (_GZIP, "is compressed; name it .gz, or unpack it"),
+    (b"PAR1", "is Parquet; mumacro eval reads it by the name .parquet, or write it as CSV"),
     (b"ARROW1", "is an Arrow file (Feather, .arrow); write it as Parquet"),
     (b"\xff\xff\xff\xff", "is a stream of Arrow; write it as Parquet"),
     (b"FEA1", "is Feather; write it as Parquet"),
@@ -107,13 +108,15 @@ def encoding_of(name: str) -> str:
 def byte_pieces(source: Path | bytes) -> Iterator[tuple[bytes, float]]:
     """Yield the bytes of a file in pieces, also of a compressed file (.gz), each with the fraction
     of the file that is read after it.  Raise TextError if a compressed file is damaged."""
-    if isinstance(source, bytes):
-        yield source, 1.0
-        return
-    size, most = max(source.stat().st_size, 1), max(PIECE, _START)
+    if isinstance(source, bytes) and source.startswith(_GZIP):
+        raise TextError("it is compressed: unpack it first")
+    most = max(PIECE, _START)
     try:
-        with source.open("rb") as raw:
-            stream: Any = gzip.GzipFile(fileobj=raw) if source.name.lower().endswith(".gz") else raw
+        with io.BytesIO(source) if isinstance(source, bytes) else source.open("rb") as raw:
+            size = max(raw.seek(0, io.SEEK_END), 1)
+            raw.seek(0)
+            is_compressed = isinstance(source, Path) and source.name.lower().endswith(".gz")
+            stream: Any = gzip.GzipFile(fileobj=raw) if is_compressed else raw
             while data := stream.read(most):
                 yield data, raw.tell() / size
                 most = PIECE

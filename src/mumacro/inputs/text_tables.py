@@ -26,6 +26,7 @@ from mumacro.kernel.arrays import Array
 _WORDS = {",": "comma", ";": "semicolon", "|": "bar", "\t": "tab", BLANKS: "blanks"}
 _WORDS_OF_SIGNS = {".": "point", ",": "comma"}
 _BETWEEN = re.compile(r"[,;|\s]+")  # anything that separates cells
+_OF_START = 2 * LOOKED_AT  # lines that are searched for the header, and for units below it
 _AT_ONCE = 2_000  # rows that are searched for the decimal separator at a time
 
 
@@ -44,7 +45,10 @@ class Most(NamedTuple):
         Traceback (most recent call last):
         mumacro.errors.TextError: line 8: a cell may have up to 3 characters
         """
-        for number, line in enumerate(piece.lines, piece.first):
+        lines = piece.lines
+        if len(max(lines, key=len)) <= min(self.cell, self.columns):
+            return
+        for number, line in enumerate(lines, piece.first):
             if len(line) > self.cell and max(map(len, _BETWEEN.split(line))) > self.cell:
                 raise TextError(f"line {number}: a cell may have up to {self.cell:,} characters")
             if len(line) > self.columns:
@@ -77,7 +81,7 @@ class TextTable:
             if most is not None:
                 most.check(piece)
             self._start.append(piece)
-            lines += piece.lines
+            lines += piece.text.split("\n", _OF_START)[:_OF_START]
             if len(lines) >= LOOKED_AT:
                 break
         self.account = Account(lines, column_names, dialect, text.encoding)

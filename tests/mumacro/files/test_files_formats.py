@@ -410,7 +410,7 @@ def said(inputs: Any, head: str, key: str, unit: str) -> Any:
     return pa.table(inputs.columns, schema=pa.schema(fields))
 
 
-@pytest.mark.parametrize("key", ["unit", "units"])
+@pytest.mark.parametrize("key", ["unit", "units", "Unit"])
 def test_the_unit_of_a_field_of_parquet_is_that_of_its_column(
     tmp_path: Path, capsys: Capture, key: str
 ) -> None:

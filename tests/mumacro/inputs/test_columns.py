@@ -177,7 +177,7 @@ CONTAINERS: dict[str, Callable[[str, str], Any]] = {
 }
 
 
-@pytest.mark.parametrize("attribute", ["units", "unit"])
+@pytest.mark.parametrize("attribute", ["units", "unit", "Units", "Unit"])
 @pytest.mark.parametrize("container", CONTAINERS)
 def test_the_unit_that_a_container_says_is_that_of_its_numbers(
     container: str, attribute: str
@@ -234,7 +234,7 @@ def test_a_gap_spoils_its_case_alone_and_the_case_knows_why() -> None:
     assert reasons == {
         1: ("std_Fz", "x", "a number, not a text"),
         2: ("k", "soft", "a number, not a text"),
-        4: ("k", None, "is missing; write rigid or a number"),
+        4: ("k", None, "a real number: it is missing; write rigid or a number"),
     }
     part = answer.cases.part(slice(2, 5))
     assert [part.reason(i).value for i in (0, 2)] == ["soft", None]

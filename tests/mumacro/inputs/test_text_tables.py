@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import time
+import tracemalloc
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -511,6 +512,20 @@ def test_a_sparse_file_of_two_gigabytes_is_not_read_to_its_end(tmp_path: Path) -
         with pytest.raises(TextError, match=f"line {3 if begin else 1} has a zero byte"):
             read_points(path)
         path.unlink()
+
+
+def test_millions_of_empty_lines_are_counted_and_not_kept() -> None:
+    def peak(n: int) -> int:
+        data = b"v0,mu_macro\n" + b"\n" * n + b"1,0.2\n" + b"\n" * n
+        tracemalloc.start()
+        points = read(data)
+        assert (points.lines, points.skipped) == ([n + 2], [])
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return peak
+
+    # a piece of the text, and a list of its lines with 8 bytes each
+    assert peak(8 * 2**20) - peak(2) < 64 * 2**20
 
 
 def long_line(n: int) -> bytes:
