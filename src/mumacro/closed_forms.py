@@ -303,6 +303,18 @@ def border_blend(y: ArrayLike) -> Any:
 
 
 @np.errstate(all="ignore")
+def reverse_slip(ray: ArrayLike) -> Any:
+    """Return y~ [-] from which a spring that is shaken along also slips backwards, at ``ray`` =
+    v~/y~ from 0 to 1: 1/(sqrt(1 - ray^2) - ray arccos(ray)).
+
+    >>> float(reverse_slip(0.0)), float(reverse_slip(1.0))
+    (1.0, inf)
+    """
+    ray = _float(ray)
+    return 1.0 / (np.sqrt((1.0 - ray) * (1.0 + ray)) - ray * np.arccos(ray))
+
+
+@np.errstate(all="ignore")
 def corner_root(v: ArrayLike, eta: ArrayLike) -> Any:
     """Return the positive root of mu~^3 + 2 (y~ - 1) mu~ = pi v~ [-], which is mu~ near y~ = 1, v~
     -> 0 to O(mu~^3). eta = y~ - 1."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, Unpack, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from mumacro import plotting
+from mumacro import closed_forms, plotting
 from mumacro.errors import InputError, TableError
 from mumacro.frames import evaluate_labelled, frame_of_cases
 from mumacro.inputs.case import NUMBERS, read
@@ -193,30 +193,22 @@ class Surrogate:
     def regimes_on_map(self, kind: Kind) -> dict[str, tuple[float, float]]:
         """Return the regimes on the map of a contact and direction, each with the place of its
         name: one of ``plotting.AREAS``."""
-        v, y = zip(*(plotting.place(*area, kind.normal) for area in plotting.AREAS), strict=True)
-        regimes = self._regimes_at(kind, np.array(v), np.array(y))
+        v, y = np.array([plotting.place(*area, kind.normal) for area in plotting.AREAS]).T
+        # v~ = v0 and y~ = y0
+        cases = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": v, kind.amplitude: y}
+        regimes = self.evaluate(cases, **kind.names).regime
         return dict(reversed([*zip(map(str, regimes), plotting.AREAS, strict=True)]))
 
-    def _regimes_at(self, kind: Kind, v: Array, y: Array) -> NDArray[Any]:
-        """Return the regime at each v~ (n,) and y~ (n,)."""
-        # v~ = v0 and y~ = y0
-        cases = {"mu0": 1.0, "Fz": 1.0, "k": 1.0, "omega": 1.0, "v0": v}
-        return np.asarray(self.evaluate({**cases, kind.amplitude: y}, **kind.names).regime)
-
     def reverse_slip_on_map(self, kind: Kind, width: int) -> tuple[Array, Array] | None:
-        """Return (v~, y~) of the border between stick-slip and reverse slip on the map, (n,) each
-        with n <= ``width``; None for a contact and direction without it."""
+        """Return (v~, y~) of the border between stick-slip and reverse slip on the map, (width,)
+        each; None for a contact and direction without it."""
         if not {"stick_slip", "reverse_slip"} <= self.regimes_on_map(kind).keys():
             return None
-        v = plotting.speeds(width)
-        low, high = (np.full(width, end) for end in plotting.Y_RANGE)
-        v = v[self._regimes_at(kind, v, high) == "reverse_slip"]
-        low, high = low[: v.size], high[: v.size]
-        for _ in range(60):
-            middle = np.sqrt(low * high)
-            beyond = self._regimes_at(kind, v, middle) == "reverse_slip"
-            low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-        return v, high
+        # v~ over y~ - v~, from the left of the map to its top
+        odds = np.geomspace(plotting.V_RANGE[0], 95.0, width)
+        ray = odds / (1.0 + odds)
+        y = closed_forms.reverse_slip(ray)
+        return ray * y, y
 
     def on_threads(self, threads: int | None) -> Self:
         """Return the same table, whose calls use so many threads, see :meth:`open`."""

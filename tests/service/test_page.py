@@ -65,6 +65,9 @@ def test_the_map_is_the_surrogates(client: Any, surrogate: Surrogate, kind: Any)
     )
     reverse = np.array(data["reverse"]).reshape(-1, 2)
     assert (len(reverse) > 100) is (kind == ("spring", "along"))
+    if len(reverse):  # from the left of the map to its top
+        assert reverse[0, 0] == close(v[0], rel=1e-3)
+        assert 0.99 * y[-1] < reverse[-1, 1] <= y[-1]
     for side, regime in ((0.999, "stick_slip"), (1.001, "reverse_slip")):
         near = {**unit, "v0": reverse[:, 0], amplitude: side * reverse[:, 1]}
         assert {*surrogate.evaluate(near, **names).regime} <= {regime}

@@ -7,10 +7,9 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from mumacro import Surrogate
-from mumacro.closed_forms import master_curve_limit
+from mumacro.closed_forms import master_curve_limit, reverse_slip
 from mumacro.table.atlas import QUANTITY_NAMES, SOURCES
 from tests.mumacro.contacts.test_contact_ball import by_quad
 from tests.mumacro.kernel.test_tight_bounds import play
@@ -113,13 +112,8 @@ def test_normal_is_the_master_curve_and_a_marched_spring(table: Surrogate) -> No
 
 
 def test_where_reverse_slip_begins_the_slopes_jump_and_the_bound_says_so(table: Surrogate) -> None:
-    v = 0.5
-    a = brentq(
-        lambda a: 2.0 * (math.sqrt(a * a - v * v) - v * math.acos(v / a)) - 2.0,
-        1.0,
-        5.0,
-        xtol=1e-15,
-    )
+    a = float(reverse_slip(0.25))
+    v = 0.25 * a
     below, at, above = (
         table.evaluate(**UNIT, y0=a * x, v0=v, **ALONG, gradient=True)
         for x in (1 - 1e-9, 1, 1 + 1e-9)
