@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 
 from builder.solver.sweep import Sweep
 from mumacro import Surrogate
@@ -28,6 +29,13 @@ if TYPE_CHECKING:  # tests of the library need neither the service nor its depen
 
 TESTS = Path(__file__).resolve().parent
 REPOSITORY = TESTS.parent
+
+# a test that is stated for all examples states nothing about their time: a busy machine may take
+# any
+settings.register_profile(
+    "any time", settings.default, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("any time")
 
 
 @pytest.fixture(scope="session")

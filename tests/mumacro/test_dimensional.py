@@ -51,7 +51,7 @@ def same_digits(value: Any, expected: float) -> bool:
 # --- the groups -----------------------------------------------------------------------------------
 
 
-@settings(max_examples=600, deadline=None)
+@settings(max_examples=600)
 @given(case=any_inputs)
 @example(case=dict(zip(FIELDS, (1.0, 1e300, 1e300, 1e300, 1.0, 1e300), strict=True)))
 @example(case=dict(zip(FIELDS, (1e-300, 1e-300, 1e-300, 1e-300, 1.0, 1e-300), strict=True)))
@@ -132,7 +132,7 @@ def test_groups_that_leave_double_precision_have_their_limit(
 exponent = st.integers(min_value=-60, max_value=60)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(a=exponent, b=exponent, c=exponent, v=st.floats(1e-6, 1e6), y=st.floats(1e-6, 1e6))
 def test_only_the_two_groups_matter(
     table: Surrogate, a: int, b: int, c: int, v: float, y: float

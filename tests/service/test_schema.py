@@ -139,9 +139,7 @@ def is_refused_in_its_place(response: Any) -> Any:
 
 @pytest.mark.slow
 @SCHEMA.parametrize()  # type: ignore[untyped-decorator]
-@settings(
-    max_examples=EXAMPLES, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
-)
+@settings(max_examples=EXAMPLES, derandomize=True, suppress_health_check=list(HealthCheck))
 def test_every_answer_is_as_described(case: Any, live_server: Any) -> None:
     response = case.call(base_url=live_server.url)
     excluded = (

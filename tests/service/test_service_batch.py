@@ -284,7 +284,7 @@ def test_the_advice_for_an_unknown_name_is_looked_for_in_rows_that_are_listed(cl
 BESIDE_AN_INTERVAL = ("k", "must be finite beside rows with an interval of k")
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(rows=CASES)
 @example(rows=[{**SPRING, "k": 1e6, "contact": name} for name in ("ball", "cube")])
 @example(rows=[{**LIFTED, "k": 1e6, "y0": True}])

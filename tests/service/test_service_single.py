@@ -41,7 +41,7 @@ def ask(client: Any, case: Case, **options: Any) -> Any:
     return json.loads(response.text, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(one_case=cases)
 def test_the_answer_is_the_surrogates_and_always_json(
     client: Any, surrogate: Surrogate, one_case: Any

@@ -114,7 +114,7 @@ def test_an_interval_of_stiffness_grows_as_a_whole(surrogate: Surrogate) -> None
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids=" ".join)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     log_v0=st.floats(-5.0, 0.5),
     m=st.floats(0.05, 0.95),

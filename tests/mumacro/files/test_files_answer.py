@@ -32,7 +32,7 @@ DOUBLES = st.floats(1e-9, 1e9) | st.sampled_from(ODD)
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.lists(st.tuples(*[DOUBLES] * 6), min_size=1, max_size=40))
 @example([(3.0, 0.5, 161792383.0, 1e300, 1e-300, 0.0)])
 def test_every_row_has_the_bits_of_the_surrogate_or_is_in_the_rejects(rows: Any) -> None:

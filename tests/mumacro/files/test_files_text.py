@@ -94,7 +94,7 @@ def test_text_of_every_ending_comes_in_and_goes_out(tmp_path: Path, ending: str,
         assert friction(tmp_path / f"out.{ending}", written) == close(MU, rel=1e-12)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     notes=st.lists(
         st.sampled_from(["", "a", "a b", '"', "a\nb", "#1", "1,5", "µ", "x;y", "'", "a\tb"]),
@@ -301,7 +301,7 @@ def test_a_row_without_a_value_is_rejected_and_the_run_goes_on(tmp_path: Path) -
     assert (summary.answered, summary.rejected) == (2, 2)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.lists(
         st.tuples(

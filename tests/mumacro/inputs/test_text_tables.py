@@ -188,7 +188,7 @@ def value_of(text: str, decimal: str) -> float:
     return float(plain.replace(",", "").replace("D", "E"))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @example([(1000.0, 1.0)], ",", ",", (",.0f", "r"), "\n", "utf-8", [], "none", False, "")
 @given(
     rows=st.lists(st.tuples(NUMBERS, NUMBERS), min_size=1, max_size=8),
@@ -251,7 +251,7 @@ def test_a_table_is_read_as_it_was_written_unless_it_has_two_meanings(
     assert {*table.lines} <= {*numbered}
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(
     text=st.text(alphabet="ab,\r\nµ €", max_size=60),
     encoding=st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "utf-32"]),

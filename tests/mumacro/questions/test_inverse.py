@@ -38,7 +38,7 @@ cases = st.fixed_dictionaries(
 
 
 @every_pair
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(case=cases, share=st.floats(0.001, 0.999), place=st.integers(0, 5))
 def test_the_forward_answer_is_inverted(
     surrogate: Surrogate, pair: Any, case: Case, share: Any, place: Any
@@ -214,7 +214,7 @@ def test_rigid_contact_is_inverted_and_friction_coefficients_are_found_far_out(
 
 @pytest.mark.parametrize("contact", ["spring", pytest.param("ball", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("unknown", ["k", "Fz"])
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(v0=decade(-5, 0), share=st.floats(0.001, 0.999))
 def test_no_root_is_missed_on_a_ray(
     surrogate: Surrogate, contact: Any, unknown: Any, v0: Any, share: Any
