@@ -338,6 +338,8 @@ def _interval(name: str, quantity: str, raw: str, text: str) -> Value:
 
 # --- the texts of one case ------------------------------------------------------------------------
 
+# a comma that can only be decimal, points that can only separate thousands; a point that may be
+# either
 _GERMAN = re.compile(r"\d,(?:\d{1,2}|\d{4,})(?!\d)|\d\.\d{3}\.\d{3}(?!\d)|\d\.\d{3},\d")
 _EITHER = re.compile(r"(?<![\d.,])([1-9]\d{0,2})\.(\d{3})(?![\d.,])")
 

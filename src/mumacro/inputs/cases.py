@@ -75,7 +75,6 @@ COLUMNS = (*ALL_FIELDS, "f", *ENDS, *KIND, *DEVIATIONS)
 #: further names that a mapping may have: options of one call
 OPTIONS = ("include", "gradient", "illegal")
 EXACT = "finite and >= 0, 0 where the input is exact"  # the bound of a deviation
-# types that are always one number without a deviation
 A_DEVIATION = "one number: the deviation itself"
 AN_END = "one number: an end of the interval"
 

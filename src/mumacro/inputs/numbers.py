@@ -175,7 +175,3 @@ def split_number(text: str) -> tuple[float, str]:
     if power is not None:
         end = power.end()
     return read_number(text[:end]), text[end:].strip()
-
-
-# a comma that can only be decimal, points that can only separate thousands; a point that may be
-# either
