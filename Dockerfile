@@ -14,6 +14,18 @@
 ARG BASE=python:3.11-slim
 ARG BUILD_BASE=${BASE}
 
+# The guide that the page links to.
+FROM ${BUILD_BASE} AS guide
+WORKDIR /project
+RUN python3 -m venv /venv
+COPY requirements/docs.txt /venv/
+RUN --mount=type=secret,id=pip.conf,target=/etc/pip.conf \
+    --mount=type=secret,id=ca.pem,target=/etc/pip-ca.pem \
+    /venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes \
+        -r /venv/docs.txt
+COPY . .
+RUN /venv/bin/sphinx-build -W -q -d /doctrees docs /guide && chmod -R a+rX,go-w /guide
+
 FROM ${BUILD_BASE} AS build
 WORKDIR /app
 # A virtual environment, because a distribution's own Python may refuse installs (PEP 668), and
@@ -65,6 +77,7 @@ LABEL org.opencontainers.image.title="mumacro" \
       org.opencontainers.image.version="0.1.0" \
       org.opencontainers.image.vendor="The mumacro developers"
 COPY --from=build /app /app
+COPY --from=guide /guide /app/service/guide
 WORKDIR /app
 ENV PATH=/app/venv/bin:$PATH \
     PYTHONPATH=/app/src:/app \

@@ -37,7 +37,12 @@ MARKER = VENV / "mumacro-installed.json"
 OLDEST, NEWER_NAMES = (3, 11), ("python3.13", "python3.12", "python3.11")
 # Each set holds those before it, at the same versions; zig.txt is added where a compiler is
 # missing.
-SETS = {"service": ("build", "service"), "test": ("test",), "tools": ("test", "tools")}
+SETS = {
+    "service": ("build", "service"),
+    "docs": ("build", "service", "docs"),
+    "test": ("test", "docs"),
+    "tools": ("test", "docs", "tools"),
+}
 #: what pytest's -m is for each option of the tests
 MARKS = {
     "--all": ("-m", "not nightly and not peer"),
@@ -213,11 +218,10 @@ def demo() -> int:
 
 
 def serve(*arguments: str) -> int:
-    ensure("service")
+    """The page's guide is built first; only what has changed is built again."""
+    ensure("docs")
+    run("sphinx-build", "-q", "docs", "build/docs", quiet=True)
     os.chdir(ROOT)
-    guide = ROOT / "build" / "docs"
-    if (guide / "index.html").is_file():
-        os.environ.setdefault("MUMACRO_GUIDE", str(guide))
     if os.name != "nt":  # the service receives the signals itself
         os.execve(PYTHON, [PYTHON, "-m", "service", *arguments], environment())  # noqa: S606
     return run(PYTHON, "-m", "service", *arguments)
@@ -229,7 +233,8 @@ def execute(*command: str) -> int:
 
 
 def docs() -> int:
-    code = execute("sphinx-build", "-W", "--keep-going", "-q", "docs", "build/docs")
+    ensure("docs")
+    code = run("sphinx-build", "-W", "--keep-going", "-q", "docs", "build/docs")
     if not code:
         print(f"The site is in {ROOT / 'build' / 'docs' / 'index.html'}", flush=True)
     return code

@@ -131,7 +131,8 @@ UNWANTED='
 import pathlib
 sources, others = {".c", ".h", ".cpp", ".hpp", ".a"}, {"pip", "tests", "ziglang"}
 found = [str(path) for path in pathlib.Path("/app").rglob("*")
-         if path.suffix in sources or path.name in others]
+         if (path.suffix in sources or path.name in others)
+         and not path.is_relative_to("/app/service/guide")]
 print(*found, end="")'
 WRITABLE='
 import pathlib, tempfile
@@ -147,6 +148,7 @@ for user in 10001:10001 123456:0; do
     ready "$url"
     right "$url" || fail "another answer"
     fits "$url" || fail "no fit"
+    curl --silent --fail "$url/guide/validity.html" | grep -q '<h1>' || fail "no guide"
     curl --silent --fail "$url/metrics" | grep -q mumacro_cases_total || fail "no counters"
     runs=$(inside 'import os; print(os.getuid(), os.getgid(), sep=":")')
     [[ $runs == "$user" ]] || fail "user $runs in place of $user"

@@ -3,9 +3,9 @@
     python requirements/lock.py [ARGS]     write them (ARGS, e.g. --upgrade, go to uv)
     python requirements/lock.py --check    exit code 1 if pyproject.toml has changed since
 
-test.txt is made first and constrains the others.  peers.txt has only what test.txt and tools.txt
-lack: it is installed beside them.  npm/package-lock.json pins npm/package.json where there is npm.
-No index is named in the result: the installing machine chooses it.
+test.txt is made first and constrains the others.  peers.txt has only what test.txt, docs.txt and
+tools.txt lack: it is installed beside them.  npm/package-lock.json pins npm/package.json where
+there is npm.  No index is named in the result: the installing machine chooses it.
 """
 
 import hashlib
@@ -107,7 +107,8 @@ def lock(folder: Path, arguments: list[str]) -> None:
     within: list[str | Path] = ["--constraint", FOLDER / "test.txt"]
     sources: dict[str, list[str | Path]] = {
         "test": test,
-        "tools": ["--group=tools", *within],
+        "docs": ["--group=docs", *within],
+        "tools": ["--group=tools", *within, "--constraint", FOLDER / "docs.txt"],
         "service": ["pyproject.toml", "--extra=service", *within],
         "build": [build, *within],
         "zig": [zig],
@@ -147,7 +148,7 @@ def lock(folder: Path, arguments: list[str]) -> None:
         if "://" in pins or "file:" in pins or " @ " in pins:
             raise SystemExit(f"the lock for {name} names a place to download from; it must not")
         if name == "peers":
-            pins = without(pins, "test", "tools")
+            pins = without(pins, "test", "docs", "tools")
         (FOLDER / out.name).write_text(HEADER + pins, encoding="utf-8", newline="\n")
         print(f"requirements/{name}.txt: {pins.count('==')} pins")
 

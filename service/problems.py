@@ -368,8 +368,7 @@ def _of_http(error: HTTPException, scope: Scope) -> RequestError:
 
 
 _NO_GUIDE = (
-    "the documentation is not installed here: in the source, python3 dev.py docs builds it, and "
-    "python3 dev.py serve has it then"
+    "the documentation is not installed here: in the source, python3 dev.py serve builds it"
 )
 
 

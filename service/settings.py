@@ -76,9 +76,10 @@ _TABLES = _BESIDE if any(_BESIDE.glob("*.nc")) else Path("tables")
 
 
 def _default_guide() -> Path | None:
-    # in a wheel that was built after the documents
-    beside = Path(__file__).resolve().parent / "guide"
-    return beside if (beside / "index.html").is_file() else None
+    service = Path(__file__).resolve().parent
+    # in the image, and in a wheel that was built after it; in a checkout where dev.py builds it
+    places = service / "guide", service.parent / "build" / "docs"
+    return next((place for place in places if (place / "index.html").is_file()), None)
 
 
 def _one_name_each(keys: dict[str, Secret[str]]) -> dict[str, Secret[str]]:

@@ -60,7 +60,7 @@ def started(tables_dir: Path) -> "Callable[..., TestClient]":
     from service.settings import Settings
 
     return lambda **settings: TestClient(
-        create_app(Settings(**{"tables": (tables_dir,), **settings}))
+        create_app(Settings(**{"tables": (tables_dir,), "guide": None, **settings}))
     )
 
 

@@ -235,11 +235,15 @@ def test_a_wheel_holds_the_built_documents_where_there_are_any(
     assert hatch_build.guide() == {
         str(site / name): f"mumacro/service/guide/{name}" for name in places
     }
-    # which is where the installed service looks for it
-    monkeypatch.setattr(settings, "__file__", str(tmp_path / "settings.py"))
+    # the service looks for it where it is built, and first where it is installed
+    monkeypatch.setattr(settings, "__file__", str(tmp_path / "service" / "settings.py"))
+    assert settings.Settings().guide == site
+    installed = tmp_path / "service" / "guide"
+    installed.parent.mkdir()
+    site.rename(installed)
+    assert settings.Settings().guide == installed
+    (installed / "index.html").unlink()
     assert settings.Settings().guide is None
-    site.rename(tmp_path / "guide")
-    assert settings.Settings().guide == tmp_path / "guide"
 
 
 def test_numbers_and_addresses_without_a_browser(
