@@ -367,9 +367,7 @@ def _of_http(error: HTTPException, scope: Scope) -> RequestError:
     return RequestError(kind, detail, headers=headers)
 
 
-_NO_GUIDE = (
-    "the documentation is not installed here: in the source, python3 dev.py serve builds it"
-)
+_NO_GUIDE = "the documentation is not installed here: in the source, python3 dev.py serve builds it"
 
 
 def _no_such_path(scope: Scope) -> str:

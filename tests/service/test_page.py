@@ -191,7 +191,7 @@ def test_built_documentation_is_served_if_named(
         assert moved.headers["location"] == "how-to/"  # a proxy with TLS has another scheme
         problem(guided.post("/guide/", headers={"X-API-Key": "open-sesame"}), 405)
     for path in ("/guide", "/guide/", "/guide/tutorial.html"):  # says how to get it
-        assert "python3 dev.py docs builds it" in problem(client.get(path), 404)["detail"]
+        assert "python3 dev.py serve builds it" in problem(client.get(path), 404)["detail"]
     assert "no such path" in problem(client.get("/guided"), 404)["detail"]
 
 
