@@ -10,7 +10,8 @@ from fastapi import Request, Response
 import mumacro
 from mumacro.errors import InputError, TextError
 from mumacro.fits.measured_points import read_points, unknowns_beside
-from mumacro.inputs.text_tables import Most, TableOfNumbers
+from mumacro.inputs.text_tables import Most
+from mumacro.inputs.whole_tables import TableOfNumbers
 from mumacro.inputs.workbooks import BEGIN as WORKBOOK
 from mumacro.stiffness import contact_of
 

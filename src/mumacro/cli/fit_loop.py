@@ -13,7 +13,7 @@ from mumacro.errors import InputError
 from mumacro.fits.loop import fit_loop
 from mumacro.inputs.case import read_one
 from mumacro.inputs.names import ColumnNames
-from mumacro.inputs.text_tables import read_numbers
+from mumacro.inputs.whole_tables import read_numbers
 
 EXAMPLE = "mumacro fit-loop loop.csv Fz=10N --displacement x --force Ft -o loop.png"
 _ABOUT = f"""\

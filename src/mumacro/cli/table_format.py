@@ -11,7 +11,7 @@ from mumacro.cli.common import ImpossibleError, UsageError
 from mumacro.errors import InputError, TextError
 from mumacro.inputs.cells import THOUSANDS
 from mumacro.inputs.layout import SEPARATORS, Dialect
-from mumacro.inputs.text_tables import TableOfNumbers
+from mumacro.inputs.whole_tables import TableOfNumbers
 
 
 def add_format(parser: argparse.ArgumentParser) -> None:

@@ -6,8 +6,7 @@ cells: inputs as numbers, other columns as text.
 
 import functools
 import glob
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,13 +18,12 @@ import pyarrow.dataset
 
 from mumacro.errors import TextError
 from mumacro.files.record_batch import FilesError
-from mumacro.inputs.account import NO_ROW, Rows
 from mumacro.inputs.carried import units_of_fields
 from mumacro.inputs.cells import BLANKS, GAPS, Signs, split_row
 from mumacro.inputs.decoding import Piece
 from mumacro.inputs.layout import Dialect
 from mumacro.inputs.names import ColumnNames
-from mumacro.inputs.text_tables import TextTable
+from mumacro.inputs.text_tables import NO_ROW, Rows, TextTable
 
 #: extensions of files that can be written, and their format
 WRITTEN = {
@@ -188,7 +186,7 @@ class TextSource:
             except TextError as error:
                 raise FilesError(f"{path}: {error}") from None
             self.tables.append(table)
-            heads, decimal = _named(table.account.units.heads), table.signs.decimal
+            heads, decimal = _named(table.units.heads), table.signs.decimal
             if len(self.tables) == 1:
                 self.heads, self.decimal = heads, decimal or "."
             if heads != self.heads:
@@ -198,11 +196,11 @@ class TextSource:
                     f"{path}: its decimal separator differs from that of {files[0]}; give the "
                     "files one by one, or write Parquet"
                 )
-        account = self.tables[0].account
+        first = self.tables[0]
         # Excel reads UTF-8 correctly if it begins with a byte-order mark
-        self.has_mark = account.encoding != "utf-8"
-        self.where = f"{files[0]}: line {account.header.start + 1}: "
-        self.sep = account.sep
+        self.has_mark = first.encoding != "utf-8"
+        self.where = f"{files[0]}: line {first.header.start + 1}: "
+        self.sep = first.sep
         self.schema = pa.schema([(head, pa.string()) for head in self.heads])
 
     def describe(self, say: Callable[[str], None]) -> None:
@@ -225,8 +223,9 @@ class TextSource:
         try:
             for piece in table.pieces():
                 rows, columns = _plain_rows(piece, table) or _rows_one_by_one(piece, table)
-                batch = pa.RecordBatch.from_arrays([columns[i] for i in places], [*names])
-                yield RowBlock(batch, rows, piece.share, table.signs)
+                if rows.texts:
+                    batch = pa.RecordBatch.from_arrays([columns[i] for i in places], [*names])
+                    yield RowBlock(batch, rows, piece.share, table.signs)
         except TextError as error:
             raise FilesError(f"{self.files[file]}: {error}") from None
 
@@ -246,14 +245,13 @@ def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] |
     """Return the rows in some lines, and their columns, if every line is a row that Arrow reads:
     each input is a number or a gap, and no line may begin like a comment or a row of statistics.
     Return None if the lines must be examined one by one."""
-    account, text, sep = table.account, piece.text, table.account.sep
-    inputs = account.units.inputs
+    text, sep, inputs = piece.text, table.sep, table.units.inputs
     shows_signs = "." in text or ('"' if sep == "," else ",") in text
     if (
-        account.header.sep == BLANKS
+        table.header.sep == BLANKS
         or not inputs
-        or account.open
-        or account.name in text
+        or table.open
+        or table.name in text
         or "\n\n" in text  # an empty line has no number
         or (shows_signs and not table.signs.decimal)
         or ('"' in text and not _quotes_surround_cells(text, sep))
@@ -264,55 +262,40 @@ def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] |
     except pa.ArrowInvalid:
         return None
     lines = piece.lines
-    numbers = [columns[i] for i in inputs]
-    has_number = functools.reduce(pc.or_, map(pc.is_valid, numbers))
-    if (
-        len(has_number) != len(lines)
-        or not pc.all(has_number).as_py()
-        or _has_infinity(numbers)
-        or any(map(_may_begin_no_row, _beginnings(columns)))
-    ):
+    has_number = functools.reduce(pc.or_, (pc.is_valid(columns[i]) for i in inputs))
+    if len(has_number) != len(lines) or not pc.all(has_number).as_py() or _may_hold_no_row(columns):
         return None
-    account.units.rows_begun = True
+    table.units.rows_begun = True
     return Rows(sep, lines, range(piece.first, piece.first + len(lines)), {}, []), columns
 
 
 def _rows_one_by_one(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]]:
     """Return the rows in some lines, and their columns: inputs as numbers, or all as text if a cell
     is not a plain number."""
-    rows, inputs = table.account.rows_in(piece), table.account.units.inputs
+    rows = table.rows_in(piece)
     table.see_signs(rows)
     if not rows.texts:
-        return rows, [pa.array([], kind) for kind in _types(table, inputs).values()]
+        return rows, []
     text = "\n".join(rows.texts)
-    with suppress(pa.ArrowInvalid):
-        columns = _read(text, table, inputs)
-        if not _has_infinity([columns[i] for i in inputs]):
-            return rows, columns
-    return rows, _read(text, table, ())
+    try:
+        return rows, _read(text, table, table.units.inputs)
+    except pa.ArrowInvalid:
+        return rows, _read(text, table, ())
 
 
-def _has_infinity(columns: Iterable[pa.Array]) -> bool:
-    """Return whether a number has too many digits, which must not become a rigid contact."""
-    return any(pc.any(pc.is_inf(column)).as_py() for column in columns)
-
-
-def _beginnings(columns: Iterable[pa.Array]) -> Iterator[pa.Array]:
-    """Yield the columns of texts in which a line may begin: up to the first column, of texts or
-    numbers, that no line leaves empty."""
+def _may_hold_no_row(columns: Iterable[pa.Array]) -> bool:
+    """Return whether a line may begin like a comment or a row of statistics: in a column of texts
+    up to the first column, of texts or numbers, that no line leaves empty."""
     for column in columns:
         if not pa.types.is_string(column.type):
             if not column.null_count:
-                return
+                return False
             continue
-        yield column
+        if pc.any(pc.match_substring_regex(column, NO_ROW, ignore_case=True)).as_py():
+            return True
         if pc.min(pc.utf8_length(pc.utf8_trim_whitespace(column))).as_py():
-            return
-
-
-def _may_begin_no_row(column: pa.Array) -> bool:
-    """Return whether a text may begin a comment or a row of statistics."""
-    return bool(pc.any(pc.match_substring_regex(column, NO_ROW, ignore_case=True)).as_py())
+            return False
+    return False
 
 
 def _quotes_surround_cells(text: str, sep: str) -> bool:
@@ -325,22 +308,19 @@ def _quotes_surround_cells(text: str, sep: str) -> bool:
     return quotes.size % 2 == 0 and bool(before.all() and behind.all())
 
 
-def _types(table: TextTable, numbers: Container[int]) -> dict[str, pa.DataType]:
-    """Return the types of the columns by their index as text: doubles for ``numbers``."""
-    return {
-        str(i): pa.float64() if i in numbers else pa.string() for i in range(table.account.width)
-    }
+def _read(text: str, table: TextTable, inputs: Collection[int]) -> list[pa.Array]:
+    """Return the columns of rows, those of ``inputs`` as doubles.
 
-
-def _read(text: str, table: TextTable, numbers: Container[int]) -> list[pa.Array]:
-    """Return the columns of rows, some of them as ``numbers``.  Raise ArrowInvalid if a line has
-    another number of cells, or a cell no number."""
-    data, types = text.encode(), _types(table, numbers)
+    Raise ArrowInvalid if a line has another number of cells, or a cell no number, or one with so
+    many digits that it would be infinite, which must not become a rigid contact.
+    """
+    data = text.encode()
+    types = {str(i): pa.float64() if i in inputs else pa.string() for i in range(table.width)}
     read = pa.csv.read_csv(
         pa.BufferReader(data),
         pa.csv.ReadOptions(use_threads=False, block_size=len(data) + 1, column_names=[*types]),
         pa.csv.ParseOptions(
-            delimiter=table.account.sep,
+            delimiter=table.sep,
             quote_char='"' if b'"' in data else False,
             ignore_empty_lines=False,
             newlines_in_values=True,
@@ -353,4 +333,7 @@ def _read(text: str, table: TextTable, numbers: Container[int]) -> list[pa.Array
             decimal_point=table.signs.decimal or ".",
         ),
     )
-    return [column.combine_chunks() for column in read.columns]
+    columns = [column.combine_chunks() for column in read.columns]
+    if any(pc.any(pc.is_inf(columns[i])).as_py() for i in inputs):
+        raise pa.ArrowInvalid("a number is too large")
+    return columns

@@ -14,7 +14,8 @@ from mumacro.inputs.doubts import UNITS, remarks
 from mumacro.inputs.fields import AMPLITUDE, MEASURED_AS, NAMES, kind_of
 from mumacro.inputs.layout import Dialect
 from mumacro.inputs.names import ColumnNames, split_unit, unknown_name
-from mumacro.inputs.text_tables import Most, TableOfNumbers, read_numbers
+from mumacro.inputs.text_tables import Most
+from mumacro.inputs.whole_tables import TableOfNumbers, read_numbers
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.results import REMARK, Note
 from mumacro.surrogate import Surrogate

@@ -630,7 +630,8 @@ def _of_all(x: float | Array, shape: tuple[int, ...]) -> float | Array:
         return x
     if x.size == 1:
         return x.item()
-    return x if x.shape == shape and x.ndim == 1 and x.flags.carray else flat(x, shape)
+    is_plain = x.shape == shape and x.ndim == 1 and x.flags.c_contiguous and x.flags.aligned
+    return x if is_plain else flat(x, shape)
 
 
 def _shape_of(columns: _Numbers, std: _Numbers) -> tuple[int, ...]:

@@ -20,11 +20,13 @@ from tests.support.cases import CASE, Capture, opened
 from tests.support.comparing import close
 
 pa = pytest.importorskip("pyarrow", reason="the extra files is not installed")
+pc = pytest.importorskip("pyarrow.compute")
 
 from mumacro.cli.main import main  # noqa: E402
-from mumacro.files import FilesError, evaluate_files, sources  # noqa: E402
+from mumacro.files import FilesError, evaluate_files  # noqa: E402
 from mumacro.inputs import decoding  # noqa: E402
 from mumacro.inputs.layout import Dialect  # noqa: E402
+from mumacro.inputs.text_tables import NO_ROW  # noqa: E402
 
 TABLE = opened(1e-12)
 MU = [0.24046650645751833, 0.13083979951924246]
@@ -282,15 +284,16 @@ def test_a_head_of_a_hundred_thousand_columns(tmp_path: Path, capsys: Capture) -
 def test_only_the_columns_in_which_a_line_may_begin_are_looked_through(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    looked_through = Mock(side_effect=sources._may_begin_no_row)
-    monkeypatch.setattr(sources, "_may_begin_no_row", looked_through)
+    looked_through = Mock(side_effect=pc.match_substring_regex)
+    monkeypatch.setattr(pc, "match_substring_regex", looked_through)
     head, row = ",".join(f"c{i}" for i in range(50)), ",".join(["1"] * 48)
     text = f"{head},{HEAD}\n" + "".join(
         f"{cell},b,{row},{line}\n" for cell, line in zip(("a", ""), ROWS.splitlines(), strict=True)
     )
     (tmp_path / "cases.csv").write_text(text)
     assert evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE).answered == 2
-    assert looked_through.call_count == 2
+    in_columns = [call for call in looked_through.call_args_list if call.args[1] == NO_ROW]
+    assert len(in_columns) == 2
 
 
 def test_a_row_without_a_value_is_rejected_and_the_run_goes_on(tmp_path: Path) -> None:
@@ -341,6 +344,16 @@ def test_the_decimal_sign_may_show_late(tmp_path: Path, monkeypatch: pytest.Monk
     (tmp_path / "late.csv").write_text(f"{HEAD}\n".replace(",", ";") + late)
     summary = evaluate_files([tmp_path / "late.csv"], tmp_path / "out.parquet", TABLE)
     assert (summary.answered, summary.rejected) == (41, 0)
+
+
+def test_a_piece_without_a_row_says_nothing_about_the_contact(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(decoding, "PIECE", 200)
+    rows = "".join(f"{line},ball\n" for line in ROWS.splitlines())
+    (tmp_path / "cases.csv").write_text(f"{HEAD},contact\n{rows * 20}" + "# end\n\n\n" * 200)
+    summary = evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
+    assert (summary.rows, summary.rejected) == (40, 0)
 
 
 # --- workbooks ------------------------------------------------------------------------------------

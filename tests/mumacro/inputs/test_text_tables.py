@@ -27,7 +27,7 @@ from mumacro.inputs.cells import BLANKS, GAPS, Signs, evidence, numbers_of
 from mumacro.inputs.decoding import Text
 from mumacro.inputs.layout import Dialect
 from mumacro.inputs.names import ColumnNames, absent
-from mumacro.inputs.text_tables import TableOfNumbers, read_numbers
+from mumacro.inputs.whole_tables import TableOfNumbers, read_numbers
 from tests.support.comparing import close
 
 V0 = [1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2]
