@@ -17,6 +17,7 @@ from tests.support.cases import (
     CASE,
     PAIRS,
     TOLERANCES,
+    Array,
     Case,
     as_kind,
     every_pair,
@@ -291,11 +292,19 @@ def test_extremes_inside(table: Surrogate, pair: Any, ratio: Any) -> None:
     assert since.mu_macro_high == close(most, rel=1e-4)
 
 
-@pytest.mark.parametrize("ratio", [9.725, 9.735, 9.75, 9.8])
-def test_turns_closer_than_samples(table: Surrogate, ratio: Any) -> None:
+@pytest.mark.parametrize(
+    ("contact", "ratio", "ends"),
+    [
+        *(("spring", ratio, np.geomspace(0.6, 0.74, 21)) for ratio in (9.725, 9.735, 9.75, 9.8)),
+        ("ball", 10.44683, np.geomspace(0.791, 0.807, 21)),
+    ],
+)
+def test_turns_closer_than_samples(
+    table: Surrogate, contact: str, ratio: float, ends: Array
+) -> None:
     """Where both turns have just begun, an interval that ends between them, or next to them."""
-    ray = {**RAY, "y0": ratio}
-    for end in np.exp(np.linspace(-0.5, -0.3, 21)):
+    ray = {**RAY, "y0": ratio, "contact": contact}
+    for end in ends:
         answer = table.evaluate(k_low=end * np.exp(-0.31), k_high=end, **ray)
         some = table.evaluate(k=end * np.exp(np.linspace(-0.31, 0.0, 5001)), **ray).mu_macro
         assert answer.mu_macro_low <= some.min() + answer.error_bound

@@ -14,9 +14,11 @@ from builder.solver.sweep import Sweep
 from mumacro import Surrogate
 from mumacro.inputs.fields import FIELDS
 from mumacro.table.atlas import CONTINUOUS, REGIME_OF_SOURCE
+from mumacro.table.netcdf import read_table
 from tests.support import naive
 from tests.support.cases import CASE, UNIT, Case, log_uniform, tables
 from tests.support.comparing import close
+from tests.support.places import TABLES
 
 table = tables()
 fine = tables(1e-12)
@@ -69,6 +71,21 @@ def test_the_last_digit_of_the_inputs_next_to_the_corner_is_covered(
     assert worst > 0.2 or table.tolerance != 1e-12
 
 
+def test_the_last_digit_of_the_inputs_beside_the_border_is_covered() -> None:
+    """Also by a table whose border is exact."""
+    path = TABLES / "mumacro-1e-12.nc"
+    exact = read_table(path)
+    for piece in exact.border:
+        piece.max_rel_error = 0.0
+    table, rng = Surrogate(exact, path), np.random.default_rng(3)
+    y = 10.0 ** rng.uniform(-3.0, 5.0, 4000)
+    v = table.v_tilde_crit(y) * (1.0 - rng.integers(0, 9, y.size) * 2.0**-53)
+    stick, bound, _ = table.quantity("stick_fraction", v, y)
+    for digits in (-2, -1, 1, 2):
+        other, its_bound, _ = table.quantity("stick_fraction", v + digits * np.spacing(v), y)
+        assert np.all(np.abs(other - stick) <= bound + its_bound)
+
+
 @pytest.mark.parametrize("y0", [1e-6, 2.9e-6, 3.1e-6, 1e-5])
 def test_the_slope_along_speed_is_not_lost_where_the_group_underflows(
     fine: Surrogate, y0: float
@@ -80,6 +97,7 @@ def test_the_slope_along_speed_is_not_lost_where_the_group_underflows(
     zero = fine.evaluate({**case, "v0": 5e-324}, gradient=True)
     answer = fine.evaluate(case, gradient=True)
     assert max(zero.v_tilde, answer.v_tilde) < 1e-320
+    assert zero.error_bound > 0.0  # also where mu~ itself underflows
     assert zero.gradient["v0"] == still.gradient["v0"] > 0.0
     for other, factor in ((still, 1.0), (slower, 1e-50)):
         expected = factor * other.gradient["v0"]

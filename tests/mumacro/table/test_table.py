@@ -22,7 +22,14 @@ from mumacro.table import atlas
 from mumacro.table.atlas import BLOCK_NAMES, BORDER_PIECES, CHARTS
 from mumacro.table.atomic import write_whole
 from mumacro.table.blocks import INTERPOLATION_ERRORS, Block, Table
-from mumacro.table.netcdf import MOST_BYTES, MOST_CELLS, _digest, read_table, write_table
+from mumacro.table.netcdf import (
+    MOST_BYTES,
+    MOST_CELLS,
+    MOST_NUMBERS,
+    _digest,
+    read_table,
+    write_table,
+)
 from mumacro.table.polynomials import nodes
 from tests.support.cases import Array
 from tests.support.places import ROOT
@@ -236,6 +243,19 @@ def test_a_variable_is_stored_in_one_way_alone(tmp_path: Path, name: str) -> Non
         del root[variable]
         root.create_dataset(variable, data=values, **storage)
     with pytest.raises(TableError, match=reason):
+        read_table(path)
+
+
+def test_a_file_of_more_numbers_than_a_table_is_refused_while_it_is_read(tmp_path: Path) -> None:
+    """Each variable has as many as one may have, of some bytes each."""
+    path, size = Path(shutil.copy(TABLE, tmp_path / "copy.nc")), (400, MOST_NUMBERS // 400)
+    with h5py.File(path, "r+") as root:
+        for chart in SPRING_CHARTS:
+            block = root[f"border/spring/{chart.name}"]
+            del block["value"]
+            block.create_dataset("value", size, "f8", np.ones(size), chunks=size, compression=9)
+    assert path.stat().st_size < 500_000
+    with pytest.raises(TableError, match=r"'value' in .* is one of more numbers than a table has"):
         read_table(path)
 
 
