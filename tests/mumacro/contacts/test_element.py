@@ -275,6 +275,8 @@ def test_extreme_steps_keep_the_limit(way: Any) -> None:
             x, y = contact.step(dx, dy)
             assert math.isfinite(x)
             assert math.hypot(x, y) <= 3.0 * (1.0 + 1e-15)
+    # the load after the step counts
+    assert Element(0.3, 10.0, 1e300).step(1e300, 0.0, Fz=20.0) == (6.0, 0.0)
     # whose squares are below it, too
     assert Element(0.3, 10.0, 1.0).step(1e-310, 1e-310) == (1e-310, 1e-310)
     assert Element(1e-300, 1e-300, 1.0).step(1.0, 1.0) == (0.0, 0.0)  # mu0 Fz is below double range

@@ -4,6 +4,7 @@ loses nothing."""
 import os
 import shutil
 import signal
+import zlib
 from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import replace
@@ -26,6 +27,7 @@ from mumacro.table.netcdf import (
     MOST_BYTES,
     MOST_CELLS,
     MOST_NUMBERS,
+    MOST_PATCHES,
     _digest,
     read_table,
     write_table,
@@ -246,6 +248,33 @@ def test_a_variable_is_stored_in_one_way_alone(tmp_path: Path, name: str) -> Non
         read_table(path)
 
 
+def test_a_chunk_that_left_a_filter_out_is_refused(tmp_path: Path) -> None:
+    path = Path(shutil.copy(TABLE, tmp_path / "copy.nc"))
+    with h5py.File(path, "r+") as root:
+        values = root["mu_ratio"][()]
+        del root["mu_ratio"]
+        variable = root.create_dataset(
+            "mu_ratio", values.shape, "f8", chunks=values.shape, compression="gzip", shuffle=True
+        )
+        plain = zlib.compress(values.tobytes())  # not shuffled
+        variable.id.write_direct_chunk((0, 0), plain, filter_mask=1)
+    with h5py.File(path) as root:
+        assert np.array_equal(root["mu_ratio"][()], values)
+    with pytest.raises(TableError, match="'mu_ratio' in / is stored in an unknown way"):
+        read_table(path)
+
+
+def test_no_link_leads_out_of_the_file(tmp_path: Path) -> None:
+    path = Path(shutil.copy(TABLE, tmp_path / "copy.nc"))
+    for link in (h5py.ExternalLink(TABLE, "/mu_ratio"), h5py.SoftLink("/error_estimate")):
+        with h5py.File(path, "r+") as root:
+            del root["mu_ratio"]
+            root["mu_ratio"] = link
+            assert root["mu_ratio"].size > 1
+        with pytest.raises(TableError, match="variable 'mu_ratio' is missing in /"):
+            read_table(path)
+
+
 def test_a_file_of_more_numbers_than_a_table_is_refused_while_it_is_read(tmp_path: Path) -> None:
     """Each variable has as many as one may have, of some bytes each."""
     path, size = Path(shutil.copy(TABLE, tmp_path / "copy.nc")), (400, MOST_NUMBERS // 400)
@@ -305,6 +334,10 @@ SIGNED: dict[str, tuple[Edit, str]] = {
         )
         for cells in (0, -1, 5000, 10**9)
     },
+    "10,000 cells of a block": (
+        lambda table: setattr(block_of(table, CORNER), "cells", (100, 100)),
+        f"corner: has more than {MOST_PATCHES} cells",
+    ),
     "a negative error": (
         lambda table: block_of(table, CORNER).cell_errors["power"].__setitem__((0, 1), -1e-300),
         "an error in 'cell_errors' is negative",
