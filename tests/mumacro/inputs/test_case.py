@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import constants
 
 from mumacro import InputError
 from mumacro.inputs.case import read
@@ -150,6 +151,7 @@ REFUSED = {
         "1 ± -0.1",
         "210 GPa",
         "1.00(10)",
+        "1 N/um m^-0",
         *("∞", "~1.2e6", "0.8–1.2 N/um", "1.2M", " "),
     ],
     "omega": ["20 kHz"],
@@ -224,6 +226,57 @@ def test_every_unit_of_the_table_is_read_and_is_its_own_name() -> None:
             if unit not in ("", "1", "-"):
                 assert quantity.units.get(canonical(unit)) == scale
         assert quantity.units[quantity.unit].si(1.0) == 1.0
+
+
+PREFIXES = {"p": -12, "n": -9, "u": -6, "m": -3, "c": -2, "d": -1}
+PREFIXES |= {"da": 1, "k": 3, "M": 6, "G": 9, "T": 12}
+BASES = {
+    **dict.fromkeys(("m", "N", "s", "Hz", "Pa", "m2", "rad", "1", "-", ""), 1.0),
+    "Å": constants.angstrom,
+    "in": constants.inch,
+    "ft": constants.foot,
+    "mil": constants.mil,
+    "kgf": constants.kgf,
+    "gf": constants.kgf / 1e3,
+    "dyn": constants.dyn,
+    "lbf": constants.lbf,
+    "ozf": constants.lbf / 16.0,
+    "mph": constants.mph,
+    "min": 60.0,
+    "h": 3600.0,
+    "mm2": 1e-6,
+    "bar": constants.bar,
+    "psi": constants.psi,
+    "ksi": 1e3 * constants.psi,
+    "%": 1e-2,
+    "‰": 1e-3,
+    "deg": math.pi / 180.0,
+    "°": math.pi / 180.0,
+}
+#: sizes of what turns, by quantity
+TURNS = {
+    "angular frequency": {"rev": math.tau, "rpm": math.tau / 60.0, "1/min": math.tau / 60.0},
+    "frequency": {"rev": 1.0, "rpm": 1.0 / 60.0},
+}
+
+
+def size(unit: str, bases: dict[str, float]) -> float:
+    """The size of a unit in SI by the definitions of its parts."""
+    if unit in bases:
+        return bases[unit]
+    upper, _, lower = unit.partition("/")
+    if lower:
+        return size(upper, bases) / size(lower, bases)
+    prefix = next(one for one in PREFIXES if unit.removeprefix(one) in bases)
+    return 10.0 ** PREFIXES[prefix] * bases[unit.removeprefix(prefix)]
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_every_unit_has_the_size_of_its_definition(quantity: str) -> None:
+    units, bases = QUANTITIES[quantity].units, {**BASES, **TURNS.get(quantity, {})}
+    of_si = size(QUANTITIES[quantity].unit, bases)
+    for unit, scale in units.items():
+        assert scale.si(1.0) == close(size(unit, bases) / of_si, rel=1e-15), unit
 
 
 @pytest.mark.parametrize(
