@@ -110,21 +110,6 @@ def approximations(surrogate: Surrogate, law: Law) -> dict[str, Array]:
     }
 
 
-def approximate_borders(y: Array) -> dict[str, Array]:
-    """Return v~crit(y~) [-] by the formulas of :data:`BORDERS`, each in an array like ``y``; NaN
-    outside the stated range.
-
-    >>> crit = approximate_borders(np.array([0.5, 2.0]))
-    >>> crit["eq_24"].round(4).tolist(), crit["eq_26"].round(4).tolist()
-    ([0.1124, nan], [nan, 0.6667])
-    """
-    with np.errstate(over="ignore", invalid="ignore"):
-        return {
-            name: np.where((y >= least) & (y <= most), formula(y), np.nan)
-            for name, (formula, least, most) in _FORMULAS.items()
-        }
-
-
 def _spring_inputs(law: Law) -> dict[str, Any]:
     """Return the inputs of a law of one spring across."""
     if law.kind != SPRING:
@@ -148,7 +133,10 @@ def border_speeds(surrogate: Surrogate, law: Law) -> dict[str, Array]:
     never_sticks = (inputs["y0"] == 0.0) | (omega == 0.0) | np.isinf(inputs["k"])
     with np.errstate(all="ignore"):
         speed_unit = np.where(np.isfinite(y), law.answer.length_scale * omega, np.nan)
-        columns = {"exact": surrogate.v_tilde_crit(y), **approximate_borders(y)}
+        columns = {"exact": surrogate.v_tilde_crit(y)} | {
+            name: np.where((y >= least) & (y <= most), formula(y), np.nan)
+            for name, (formula, least, most) in _FORMULAS.items()
+        }
         return {
             name: np.where(never_sticks, 0.0, speed_unit * column)
             for name, column in columns.items()

@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from builder.approximations import BORDERS, approximate_borders
-from mumacro import Surrogate, __version__
+from builder.approximations import BORDERS, border_speeds
+from mumacro import Surrogate, __version__, law
 from mumacro.cli.main import COMMANDS
 from tests.project.test_benchmarks import tables
 from tests.support import extended
+from tests.support.cases import UNIT
 from tests.support.comparing import close
 from tests.support.documents import PAGES
 from tests.support.places import ROOT
@@ -92,7 +93,8 @@ def test_the_errors_of_the_borders_formulas_are_those_on_the_page(surrogate: Sur
                 ends[inner[1] == "up to"] = float(inner[2])
             y = np.geomspace(ends[0], ends[1], 4001)
             y[[0, -1]] = ends
-            off = np.abs(approximate_borders(y)[column] / surrogate.v_tilde_crit(y) - 1.0).max()
+            speeds = border_speeds(surrogate, law(surrogate, "y0", values=y, **UNIT, v0=0.0))
+            off = np.abs(speeds[column] / speeds["exact"] - 1.0).max()
             figure = float(re.findall(r"\d[\d.e-]*", error)[0])  # "12.6 %" is 0.126
             assert (100.0 * off if "%" in error else off) == close(figure, rel=0.03), (
                 f"{column}: {error}"

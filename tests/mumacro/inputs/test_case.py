@@ -107,6 +107,8 @@ def test_an_interval_has_its_ends_and_their_geometric_middle() -> None:
         value = read("k", text)
         assert (value.low, value.high) == close((0.8e6, 1.2e6), rel=1e-15)
         assert value.si == close(math.sqrt(0.8e6 * 1.2e6), rel=1e-15)
+    for k in (2.0, 3.0, 10.0, 1e300):  # squares of their roots lie beside them
+        assert read("k", f"{k!r}..{k!r}")[:4] == (k, None, k, k)
 
 
 REFUSED = {
@@ -203,6 +205,12 @@ def test_advice_leads_to_the_right_number(name: str, text: str) -> None:
         assert reader(name, given) == [ADVICE[name, text]]
     else:
         assert read(name, given).si == close(ADVICE[name, text], rel=1e-11)
+
+
+@pytest.mark.parametrize("text", ["2 dB", "10 dBm", "-10 dB re 1 N", "3 decibels", "1 Neper"])
+def test_a_level_is_told_that_its_reference_is_not_known(text: str) -> None:
+    with pytest.raises(InputError, match="the reference of a level in dB is not known"):
+        read("Fz", text)
 
 
 def test_thousands_and_decimal_signs_are_read_where_they_are_clear() -> None:
