@@ -503,15 +503,28 @@ def test_all_faults_are_told_by_line() -> None:
     assert "and 15 more" in str(fault)
 
 
-def test_a_sparse_file_of_two_gigabytes_is_not_read_to_its_end(tmp_path: Path) -> None:
-    for begin in (b"", b"v0,mu_macro\n1,0.2\n"):
-        path = tmp_path / "sparse.csv"
-        with path.open("wb") as stream:
-            stream.write(begin)
-            stream.truncate(2 * 2**30)
-        with pytest.raises(TextError, match=f"line {3 if begin else 1} has a zero byte"):
-            read_points(path)
-        path.unlink()
+@pytest.mark.parametrize(
+    ("begin", "fault"),
+    [
+        (b"", "line 1 has a zero byte"),
+        (b"v0,mu_macro\n1,0.2\n", "line 3 has a zero byte"),
+        (
+            b'v0,mu_macro\n1,0.2\n"' + 30_000 * (b"1" * 1000 + b"\n"),
+            "line 3: a quote is not closed",
+        ),
+    ],
+    ids=["zeros", "rows", "open quote"],
+)
+def test_a_sparse_file_of_two_gigabytes_is_not_read_to_its_end(
+    tmp_path: Path, begin: bytes, fault: str
+) -> None:
+    path = tmp_path / "sparse.csv"
+    with path.open("wb") as stream:
+        stream.write(begin)
+        stream.truncate(2 * 2**30)
+    with pytest.raises(TextError, match=fault):
+        read_points(path)
+    path.unlink()
 
 
 def test_millions_of_empty_lines_are_counted_and_not_kept() -> None:
