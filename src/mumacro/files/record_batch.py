@@ -29,11 +29,11 @@ from mumacro.inputs.fields import (
     refusal,
 )
 from mumacro.inputs.names import ColumnNames, absent, find_heads, meant_by, split_unit
-from mumacro.inputs.units import Scale, in_si, scale_of, too_large_in_si
-from mumacro.kernel.arrays import Array, Bools, Codes
-from mumacro.outputs import OUTPUTS
-from mumacro.outputs.answer import BAND, DEFAULT, TEXTS
-from mumacro.outputs.evaluation import chosen, names_in, paths_of
+from mumacro.inputs.units import Scale, Unit, checked_in_si, scale_of
+from mumacro.kernel.arrays import Array
+from mumacro.outputs.answer import BAND, DEFAULT
+from mumacro.outputs.entry import Output
+from mumacro.outputs.evaluation import names_in, outputs_for, paths_of
 from mumacro.results import Note
 from mumacro.surrogate import Surrogate
 from mumacro.table.atlas import REGIME_OF_SOURCE, REGIMES, SOURCES
@@ -132,11 +132,11 @@ def answer(
 class Columns(NamedTuple):
     """Tell the meaning of the columns of a table of cases, and which answers are added."""
 
-    #: by input, or ``std_k`` and so on: the header, and the scale of its unit
-    headings: dict[str, tuple[str, Scale]]
+    #: by input, or ``std_k`` and so on: the header, and its unit
+    headings: dict[str, tuple[str, Unit]]
     words: list[str]  #: the columns of contact and direction, if the table has them
     kind: Kind
-    include: tuple[str, ...]
+    outputs: tuple[Output, ...]
     answer_names: list[str]  #: names of the columns with answers
 
 
@@ -165,18 +165,18 @@ def find_columns(
     columns of the file, or names a similar one.
 
     >>> find_columns(["mu0", "Fz [kN]", "k", "y0", "f", "v0", "note"]).headings["Fz"]
-    ('Fz [kN]', Scale(times=1000.0, over=1.0))
+    ('Fz [kN]', Unit(symbol='kN', scale=Scale(times=1000.0, over=1.0)))
     """
     units = units or {}
     with_units = [
-        f"{name} [{unit}]" if (unit := units.get(name)) and split_unit(name)[1] is None else name
+        f"{name} [{units[name]}]" if units.get(name) and split_unit(name)[1] is None else name
         for name in names
     ]
     heads, faults = find_heads(with_units, _INPUT_OF)
-    for name, (i, scale) in heads.items():
-        unit = units.get(names[i])
-        if unit and scale_of(_INPUT_OF[name], unit) not in (scale, None):
-            faults.append(f"the column {names[i]!r} has another unit in its field: {unit}")
+    for name, (i, unit) in heads.items():
+        of_field = units.get(names[i])
+        if of_field and scale_of(_INPUT_OF[name], of_field) not in (unit.scale, None):
+            faults.append(f"the column {names[i]!r} has another unit in its field: {of_field}")
     words = [name for name in KIND if name in names]
     faults += [
         f"the column {name!r} is there twice; rename one"
@@ -198,8 +198,7 @@ def find_columns(
     ]:
         faults += _absent(missing, names)
     deviations = any(column in heads for column in DEVIATIONS)
-    output_names = {*names_in(include)} | ({"std"} if deviations else set())
-    outputs = [output for name, output in OUTPUTS.items() if name in output_names]
+    outputs = outputs_for(frozenset(names_in(include)), kind, deviations, ends == ENDS)
     band = BAND if ends == ENDS else ()
     answer_names = [DEFAULT[0], *band, *DEFAULT[1:], *paths_of(outputs, fields)]
     faults += [
@@ -211,7 +210,7 @@ def find_columns(
         raise FilesError(where + "; ".join(faults))
     found = [name for name in _INPUT_OF if name in heads]
     headings = {name: (names[heads[name][0]], heads[name][1]) for name in found}
-    return Columns(headings, words, kind, tuple(include), answer_names)
+    return Columns(headings, words, kind, outputs, answer_names)
 
 
 def kind_of_batch(batch: pa.RecordBatch, kind: Kind, where: str = "") -> Kind:
@@ -274,51 +273,44 @@ def answer_columns(
         kinds = " and ".join(", ".join(one.names.values()) for one in (columns.kind, kind))
         raise FilesError(f"the file holds {kinds}: it is one for a file; write a file for each")
     signs, headings, kind = signs or Signs(None, None), columns.headings, columns.kind
-    read = {
-        name: _numbers(batch.column(head), name, signs, s) for name, (head, s) in headings.items()
-    }
     values: dict[str, Any] = {} if {"k", *ENDS} & headings.keys() else {"k": math.inf}
-    values |= {name: in_si(numbers, headings[name][1]) for name, (numbers, _) in read.items()}
-    faults = {
-        name: unread | too_large_in_si(numbers, values[name])
-        for name, (numbers, unread) in read.items()
-    }
-    if (other := kind.other_amplitude) in read:
+    inputs, faults = dict[str, Array](), dict[str, dict[int, str]]()
+    for name, (head, unit) in headings.items():
+        inputs[head], unread = _numbers(batch.column(head), name, signs, unit.scale)
+        values[name], too_large = checked_in_si(inputs[head], unit.scale)
+        faults[name] = unread | too_large
+    if (other := kind.other_amplitude) in headings:
         if faults[other] or not np.isnan(values[other]).all():
             error = other_amplitude(other, None, kind)
             raise FilesError(f"the column {headings[other][0]!r} must be {error.bound}")
         del values[other]
     cases = Cases.of(values, kind)
-    result = surrogate.answer(cases, chosen(columns.include, cases))
+    result = surrogate.answer(cases, columns.outputs)
     is_rejected = result.source_code < 0
     mask = is_rejected if is_rejected.any() else None
     source_code = np.where(is_rejected, 0, result.source_code).astype(np.int8)
-    arrays = {
-        "regime": _dictionary(REGIME_OF_SOURCE[source_code], REGIMES, mask),
-        "source": _dictionary(source_code, SOURCES, mask),
+    words = {
+        "regime": (REGIME_OF_SOURCE[source_code], REGIMES),
+        "source": (source_code, SOURCES),
     }
+    arrays = []
     for path in columns.answer_names:
-        if path not in TEXTS:
-            column = result[path]
+        if path in words:
+            codes, of_codes = words[path]
+            codes = pa.array(codes, pa.int8(), mask=mask)
+            column = pa.DictionaryArray.from_arrays(codes, pa.array(of_codes, pa.string()))
+        else:
+            numbers = result[path]
             # an output that does not exist is null
-            absent = np.isnan(column) if path in result.outputs else mask
-            arrays[path] = pa.array(column, mask=absent)
+            absent = np.isnan(numbers) if path in result.outputs else mask
+            column = pa.array(numbers, mask=absent)
+        arrays.append(column)
     rejects = []
     for i in np.flatnonzero(is_rejected).tolist():
         name, reason = _field_and_reason(cases.reason(i))
         rejects.append((i, name, faults.get(name, {}).get(i, reason)))
-    in_heads = {name: split_unit(heading)[1] for name, (heading, _) in headings.items()}
-    by_heading = {headings[name][0]: numbers for name, (numbers, _) in read.items()}
-    notes = result.notes_in({name: unit for name, unit in in_heads.items() if unit})
-    return AnswerColumns(
-        [arrays[path] for path in columns.answer_names], rejects, by_heading, notes
-    )
-
-
-def _dictionary(codes: Codes, words: Sequence[str], mask: Bools | None) -> pa.Array:
-    return pa.DictionaryArray.from_arrays(
-        pa.array(codes, pa.int8(), mask=mask), pa.array(words, pa.string())
-    )
+    in_heads = {name: unit.symbol for name, (_, unit) in headings.items() if unit.symbol}
+    return AnswerColumns(arrays, rejects, inputs, result.notes_in(in_heads))
 
 
 def _numbers(

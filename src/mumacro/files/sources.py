@@ -156,7 +156,7 @@ class ParquetSource:
                 numbers = range(row + 1, row + 1 + len(batch))
                 row += len(batch)
                 share = row / max(part.metadata.num_rows, 1)
-                yield RowBlock(batch, Rows("", [], numbers, {}, []), share)
+                yield RowBlock(batch, Rows(numbers), share)
         except (pa.ArrowException, OSError) as error:
             raise FilesError(f"{part.path}: damaged after row {row} ({error})") from None
 
@@ -266,7 +266,7 @@ def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] |
     if len(has_number) != len(lines) or not pc.all(has_number).as_py() or _may_hold_no_row(columns):
         return None
     table.units.rows_begun = True
-    return Rows(sep, lines, range(piece.first, piece.first + len(lines)), {}, []), columns
+    return Rows(range(piece.first, piece.first + len(lines)), lines, sep), columns
 
 
 def _rows_one_by_one(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]]:

@@ -34,15 +34,13 @@ from mumacro.inputs.case import (
     read,
 )
 from mumacro.inputs.fields import GAP, is_rigid
-from mumacro.inputs.numbers import TOO_LARGE
 from mumacro.inputs.units import (
     QUANTITIES,
     Unit,
-    in_si,
+    checked_in_si,
     parse_unit,
     quantity_of,
     scale_of,
-    too_large_in_si,
 )
 from mumacro.kernel.arrays import Array
 
@@ -146,9 +144,9 @@ def read_column(name: str, values: Any, quantity: str = "", unit: str = "") -> C
     si, faults = _doubles(name, values, quantity)
     if scale is None:
         return Column(si, unit or None, faults)
-    numbers, si = si, in_si(si, scale)
-    for place in too_large_in_si(numbers, si):
-        faults[place] = Fault(f"{numbers.flat[place]:.12g} {unit}", TOO_LARGE)
+    numbers, (si, too_large) = si, checked_in_si(si, scale)
+    for place, reason in too_large.items():
+        faults[place] = Fault(f"{numbers.flat[place]:.12g} {unit}", reason)
     return Column(si, unit, faults)
 
 

@@ -62,6 +62,8 @@ def remarks(
     ('k', 'l0 = mu0 Fz / k = 3 m, above 1 cm: is k = 1 in N/m?')
     >>> remarks({**case, "k": 1.0}, units={"k": "N/mm"})[0].text
     'l0 = mu0 Fz / k = 3 m, above 1 cm: is k = 0.001 N/mm right?'
+    >>> remarks({**case, "mu0": 30.0}, units={"mu0": "-"})[0].text
+    'mu0 = 30, usual is 0.001 to 2: is it right?'
     """
     if _usual(columns):
         rigid = columns["k"] == math.inf
@@ -278,8 +280,9 @@ def _number(value: float, unit: Unit) -> str:
 
 
 def _quantity(value: float, unit: Unit) -> str:
-    """Return the value with the unit."""
-    return f"{_number(value, unit)} {unit.symbol}".rstrip()
+    """Return the value with the unit; a ratio has none."""
+    symbol = "" if unit.symbol in ("-", "1") else unit.symbol
+    return f"{_number(value, unit)} {symbol}".rstrip()
 
 
 def _largest(case: Mapping[str, float], *names: str) -> str:

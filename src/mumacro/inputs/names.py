@@ -4,15 +4,17 @@ with a unit.  Return also the unit, and the advice for a name that is unknown or
 import difflib
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from mumacro.inputs.fields import INPUTS, NAMES, QUANTITY_OF
 from mumacro.inputs.units import (
     QUANTITIES,
-    Scale,
+    Unit,
     canonical,
     explain_unit,
+    parse_unit,
+    quantity_of,
     scale_of,
     unit_of,
 )
@@ -149,40 +151,43 @@ class ColumnNames(NamedTuple):
         """Return whether a text contains all necessary names, as words or within other words."""
         return all(any(name in text for name in names) for names in self.required_groups)
 
+    def are_among(self, names: Collection[str]) -> bool:
+        """Return whether some names contain all necessary names."""
+        return all(any(name in names for name in group) for group in self.required_groups)
+
     def heads_in(self, cells: Sequence[str]) -> list[tuple[str, str | None]]:
         """Return the name and the unit in each cell of a header, or nothing if a necessary name is
         not among them."""
         heads = [split_unit(heading(cell, self.input_of)) for cell in cells]
-        names = {name for name, _ in heads}
-        return [] if any(names.isdisjoint(group) for group in self.required_groups) else heads
+        return heads if self.are_among({name for name, _ in heads}) else []
 
 
 def find_heads(
     heads: Sequence[str], input_of: Mapping[str, str]
-) -> tuple[dict[str, tuple[int, Scale]], list[str]]:
+) -> tuple[dict[str, tuple[int, Unit]], list[str]]:
     """Return the index and the unit of each column by name, and the faults of the headers.
 
     ``input_of`` has the names of the columns, and for each the input whose units it has; other
     columns are left out.
 
     >>> find_heads(["v0 [mm/s]", "note"], {"v0": "v0"})
-    ({'v0': (0, Scale(times=1.0, over=1000.0))}, [])
+    ({'v0': (0, Unit(symbol='mm/s', scale=Scale(times=1.0, over=1000.0)))}, [])
     """
-    columns: dict[str, tuple[int, Scale]] = {}
+    columns: dict[str, tuple[int, Unit]] = {}
     faults = []
     for i, head in enumerate(heads):
-        name, unit = split_unit(head)
+        name, text = split_unit(head)
         if name not in input_of:
             continue
-        scale = Scale() if unit is None else scale_of(input_of[name], unit)
-        if scale is None:
-            reason = _why_no_unit(name, unit or "", input_of[name])
+        unit = Unit("") if text is None else parse_unit(quantity_of(input_of[name]), text)
+        if unit is None:
+            reason = _why_no_unit(name, text or "", input_of[name])
             faults.append(f"the column {head!r} has a unit that {reason}")
         if name in columns:
             faults.append(
                 f"{name} is there twice: {heads[columns[name][0]]!r} and {head!r}; rename one"
             )
-        columns[name] = i, scale or Scale()
+        columns[name] = i, unit or Unit("")
     if {"f", "omega"} <= columns.keys():
         faults.append("there are both f [Hz] and omega [rad/s]; leave one out")
     return columns, faults

@@ -13,7 +13,7 @@ separator, and reads the numbers.
 import csv
 import enum
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -114,13 +114,13 @@ class Line(enum.Enum):
 class Rows(NamedTuple):
     """Hold rows of a table in order, as text: each has as many cells as the header."""
 
-    sep: str
-    texts: list[str]
     lines: Sequence[int]  #: the line of the file in which each row begins
+    texts: list[str] = []  # noqa: RUF012 - never changed
+    sep: str = ""
     #: by the index of a row: its text, and why it does not belong to this table; its cells are
     #: empty
-    faults: dict[int, tuple[str, str]]
-    skipped: list[int]  #: lines between them that are neither rows nor empty
+    faults: Mapping[int, tuple[str, str]] = {}
+    skipped: Sequence[int] = ()  #: lines between them that are neither rows nor empty
 
     def cells(self) -> Iterator[list[str]]:
         """Yield the cells of each row."""
@@ -172,7 +172,7 @@ class TextTable:
             header.cells.pop()
         input_of = column_names.input_of
         self.units = ColumnUnits(header.cells, header.sep, input_of, self._remedy_of_units)
-        self.has_names = bool(column_names.heads_in(header.cells))
+        self.has_names = column_names.are_among(self.units.names)
         self.width = len(self.units.names)
         #: separator of the cells in rows, after blanks were replaced by tabs
         self.sep = "\t" if header.sep == BLANKS else header.sep
@@ -288,8 +288,8 @@ class TextTable:
 
     def rows_in(self, piece: Piece) -> Rows:
         """Return the rows in some lines, each of which is accounted for."""
-        lines = list[int]()
-        rows = Rows(self.sep, [], lines, {}, [])
+        lines, texts = list[int](), list[str]()
+        faults, skipped = dict[int, tuple[str, str]](), list[int]()
         for number, line in enumerate(piece.lines, piece.first):
             if not line and not self.open:  # there may be millions
                 continue
@@ -305,14 +305,14 @@ class TextTable:
                 self.units.rows_begun = True
                 if fault is not None:
                     excerpt = text if len(text) <= _EXCERPT else f"{text[:_EXCERPT]}…"
-                    rows.faults[len(rows.texts)] = excerpt, fault
-                rows.texts.append(row)
+                    faults[len(texts)] = excerpt, fault
+                texts.append(row)
                 lines.append(self.begun)
             elif what is not Line.EMPTY:
-                rows.skipped.append(self.begun)
+                skipped.append(self.begun)
         if sum(map(len, self.open)) > LONGEST:
             raise unclosed(self.begun)
-        return rows
+        return Rows(lines, texts, self.sep, faults, skipped)
 
     def _whole_row(self, line: str) -> str | None:
         """Return the row that ends with a line with quotes, or None if it goes on, because a quoted

@@ -240,10 +240,13 @@ def in_si(values: Array, scale: Scale) -> Array:
     return np.where(np.isinf(si) & np.isfinite(values), math.nan, si)
 
 
-def too_large_in_si(values: Array, si: Array) -> dict[int, str]:
-    """Return the faults of the numbers that :func:`in_si` made NaN, by their index."""
+def checked_in_si(values: Array, scale: Scale) -> tuple[Array, dict[int, str]]:
+    """Return the same, and the faults of the numbers that are too large, by their index."""
+    si = in_si(values, scale)
+    if si is values:
+        return si, {}
     places = np.flatnonzero(np.isnan(si) & ~np.isnan(values))
-    return dict.fromkeys(places.tolist(), TOO_LARGE)
+    return si, dict.fromkeys(places.tolist(), TOO_LARGE)
 
 
 # --- a unit as people and programs write it -------------------------------------------------------

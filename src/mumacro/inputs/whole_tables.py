@@ -10,7 +10,7 @@ from mumacro.inputs.cells import Cell, numbers_of
 from mumacro.inputs.layout import Dialect
 from mumacro.inputs.names import ColumnNames, absent, find_heads
 from mumacro.inputs.text_tables import Most, TextTable, names_statistics
-from mumacro.inputs.units import in_si, too_large_in_si
+from mumacro.inputs.units import checked_in_si
 from mumacro.kernel.arrays import Array
 
 
@@ -75,11 +75,11 @@ def read_numbers(
         for name, (i, _) in columns.items()
     )
     si, as_written = dict[str, Array](), dict[str, Array]()
-    for name, (i, scale) in columns.items():
+    for name, (i, unit) in columns.items():
         texts = [cells[i] for cells in rows]
-        as_written[name], bad = numbers_of(texts, input_of[name], signs, scale)
-        si[name] = in_si(as_written[name], scale)
-        bad |= too_large_in_si(as_written[name], si[name])
+        as_written[name], bad = numbers_of(texts, input_of[name], signs, unit.scale)
+        si[name], too_large = checked_in_si(as_written[name], unit.scale)
+        bad |= too_large
         for j in np.flatnonzero(np.isnan(si[name])).tolist():
             fault = f"{bad[j]}, got {texts[j].strip()[:80]!r}" if j in bad else "is missing"
             wrong.append((lines[j], f"line {lines[j]}: {name} {fault}"))

@@ -16,6 +16,7 @@ from typing import Any, BinaryIO
 
 from mumacro.errors import TextError, missing
 from mumacro.inputs.cells import evidence
+from mumacro.inputs.layout import LOOKED_AT
 
 # other zip files, by the beginning of their first member or of the list of their members
 _OPEN_DOCUMENT = b"mimetypeapplication/vnd.oasis.opendocument"
@@ -28,7 +29,6 @@ _ROWS = 1_048_576  # largest number of rows of a sheet of Excel
 _SHEETS, _TEXTS, _OTHERS = 512 * 2**20, 64 * 2**20, 4 * 2**20
 # parts that openpyxl does not open here
 _UNREAD = tuple(f"xl/{name}" for name in ("media/", "charts/", "drawings/", "embeddings/", "pivot"))
-_LOOKED_AT = 2_000  # the names must be within this number of rows of a sheet
 _LARGEST = 100 * 2**20  # largest number of characters of a sheet as text
 _FORMULA = re.compile(rb"<f[ />]")
 # what a number format adds to a number: texts in quotes, or characters after a backslash
@@ -95,8 +95,8 @@ def _chosen(
         with_names = []
         for one in group:
             one.reset_dimensions()
-            rows = islice(one.iter_rows(), _LOOKED_AT)
-            with suppress(TextError):  # an empty sheet, or units that cannot be assigned
+            rows = islice(one.iter_rows(), LOOKED_AT)
+            with suppress(TextError):  # an empty sheet
                 if has_names([SEP.join(_text(cell, decimal) for cell in row) for row in rows]):
                     with_names.append(one)
         if len(with_names) > 1:

@@ -55,16 +55,16 @@ def chosen(
     names = () if type(include) is tuple and not include else names_in(include)
     if not names and not gradient and not cases.std:
         return ()
-    return _chosen(
-        frozenset(names), bool(gradient), cases.kind, bool(cases.std), cases.ends is not None
-    )
+    has_ends = cases.ends is not None
+    return outputs_for(frozenset(names), cases.kind, bool(cases.std), has_ends, bool(gradient))
 
 
 @cache
-def _chosen(
-    names: frozenset[str], gradient: bool, kind: Kind, deviations: bool, interval: bool
+def outputs_for(
+    names: frozenset[str], kind: Kind, deviations: bool, interval: bool, gradient: bool = False
 ) -> tuple[Output, ...]:
-    """Return the same from the properties of the cases on which it depends."""
+    """Return the same from the properties of the cases on which it depends: whether they have
+    deviations, and intervals of k."""
     if "std" in names and not deviations:
         bound = "without std where no input has a deviation: give one, such as std_k"
         raise InputError("include", "std", bound)

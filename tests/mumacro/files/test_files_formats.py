@@ -423,6 +423,10 @@ def test_the_unit_of_a_field_of_parquet_is_that_of_its_column(
         written = pq.read_table(tmp_path / "out.parquet")
         np.testing.assert_allclose(written["mu_macro"].to_numpy(), right, rtol=1e-12)
         assert written[head].to_pylist() == in_mm["v0"].to_pylist()
+    fast = inputs.set_column(5, "v0", pa.array([1e6] * 20))
+    source = write(said(fast, "v0", key, "mm/s"), tmp_path / "fast.parquet")
+    remarks = evaluate_files([source], tmp_path / "out.parquet", TABLE, force=True).remarks
+    assert "v0 = 1000000 mm/s" in remarks[0]["text"]
     other = write(said(inputs, "v0", key, "m/s"), tmp_path / "other.parquet")
     bad = write(said(inputs, "v0 [mm/s]", key, "m/s"), tmp_path / "bad.parquet")
     mass = write(said(inputs, "v0", key, "kg"), tmp_path / "mass.parquet")
