@@ -60,11 +60,9 @@ def _law(question: LawRequest, table: LoadedTable) -> tuple[Law, dict[str, list[
     answer = table.surrogate.answer(cases, chosen(question.outputs, cases))
     columns = {
         path: words(column) if path in TEXTS else column.tolist()
-        for path, column in answer.columns.items()
+        for path, column in {**answer.columns, **law.columns}.items()
+        if path != along
     }
-    columns["mu_static"] = law.mu_static.tolist()
-    if law.stiffening is not None:
-        columns["k"] = law.inputs["k"].tolist()
     return law, columns
 
 

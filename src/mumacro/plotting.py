@@ -279,7 +279,7 @@ def plot_law(
     with its ``static`` limit (n,).
 
     ``band`` are the smallest and the largest mu_macro over an interval of k, (n,) each, or with
-    ``band_of`` "std" one standard deviation below and above.  ``borders`` are places on ``x`` with
+    ``band_of`` "std" one deviation of the inputs up and down.  ``borders`` are places on ``x`` with
     their names, such as "border of continuous sliding". ``roots_of`` are values of the input to
     mark, by the mean [-] that they give.  ``title`` names the other inputs.
     """
@@ -287,7 +287,9 @@ def plot_law(
     symbol = rf"$\mu_\mathrm{{{of.removeprefix('mu_')}}}$"
     ax.plot(x, mean, color="C0", label=symbol)
     if band:
-        words = {"k": "for every $k$ of the interval", "std": "one standard deviation"}[band_of]
+        words = {"k": "for every $k$ of the interval", "std": "inputs one deviation up or down"}[
+            band_of
+        ]
         ax.fill_between(x, *band, color="C0", alpha=0.2, lw=0.0, label=words)
     if static is not None:
         ax.plot(x, static, ":", color=ink, alpha=0.7, label=r"static limit, $v_0 \to 0$")

@@ -75,8 +75,8 @@ def test_one_case_has_the_outputs_that_it_has_among_many(table: Surrogate, kind:
 def test_one_interval_is_answered_in_plain_numbers(table: Surrogate, kind: Kind) -> None:
     _, _, case = as_kind(CASE, (kind.names["contact"], kind.names["direction"]))
     k = case.pop("k")
-    include = [name for name in names_for(kind) if "interval" not in OUTPUTS[name].lacks]
-    answer = table.evaluate(case, **kind.names, k_low=0.8 * k, k_high=1.2 * k, include=include)
+    interval = {"k_low": 0.8 * k, "k_high": 1.2 * k}
+    answer = table.evaluate(case, **kind.names, **interval, include=names_for(kind))
     assert "mu_macro_low" in answer.paths
     for path in answer.paths:
         assert type(answer[path]) is (str if path in TEXTS else float), path
@@ -236,15 +236,9 @@ def test_a_frequency_that_is_refused_is_named_with_every_output(
 
 
 def test_an_output_that_no_case_has_is_not_included(table: Surrogate) -> None:
-    ends = without(CASE, "k")
-    asked: list[tuple[Any, Any, Any]] = [
-        ({"direction": "along"}, CASE, {"include": ["settling"]}),
-        ({}, {**ends, "k_low": 1e6, "k_high": 2e6}, {"std_v0": 1e-3}),
-    ]
-    for words, case, include in asked:
-        for v0 in (0.01, [0.01, 0.02]):
-            with refused("include"):
-                table.evaluate({**case, "v0": v0}, **words, **include)
+    for v0 in (0.01, [0.01, 0.02]):
+        with refused("include"):
+            table.evaluate({**CASE, "v0": v0}, direction="along", include=["settling"])
 
 
 @pytest.mark.parametrize("k", [math.inf, "rigid", [math.inf, math.inf]])
@@ -304,6 +298,18 @@ def test_deviations_come_in_every_form(table: Surrogate) -> None:
 def test_a_bad_deviation_is_named(table: Surrogate, std: Any, field: str) -> None:
     with refused(field):
         table.evaluate(**CASE, **std)
+
+
+@pytest.mark.parametrize(
+    "deviation", [{"std_mu0": 0.01}, {"mu0": "0.3 ± 0.01"}, {"f": "20 ± 1 kHz"}, {"std_f": [9.0]}]
+)
+@pytest.mark.parametrize("k", [{"k": "0.8..1.2 N/um"}, {"k_low": [8e5], "k_high": [1.2e6]}])
+def test_a_deviation_beside_an_interval_of_k_is_told_by_its_own_name(
+    table: Surrogate, deviation: Any, k: Case
+) -> None:
+    case = {**without(CASE, "k", "omega"), "f": 20e3, **deviation, **k}
+    with refused(next(iter(deviation))):
+        table.evaluate(**case)
 
 
 def test_a_bad_deviation_spoils_its_case_alone(table: Surrogate) -> None:

@@ -72,10 +72,10 @@ def test_amplitudes_beyond_those_of_contacts_ask_for_the_unit(surrogate: Surroga
 TYPED = {
     ("f", "20000 kHz"): "is f = 20000 kHz right?",
     ("k", "0.001 N/mm"): "is k = 0.001 N/mm right?",
-    ("v0", "1000000 mm/s"): "v0 = 1000000 mm/s, usual is up to 300000 mm/s: is it right?",
-    ("mu0", "400 %"): "mu0 = 400 %, usual is 0.1 to 200 %: is it right?",
+    ("v0", "1000000 mm/s"): "v0 = 1000000 mm/s, usual is up to 300 m/s: is it right?",
+    ("mu0", "400 %"): "mu0 = 400 %, usual is 0.1 % to 200 %: is it right?",
     ("f", "2e7"): "is f = 20000000 in Hz?",
-    ("y0", "2"): "y0 = 2 m, usual is 1e-12 to 0.02 m: is it in metres?",
+    ("y0", "2"): "y0 = 2 m, usual is 1 pm to 20 mm: is it in metres?",
 }
 
 

@@ -120,8 +120,7 @@ export function lawPanel(store, moved) {
   const heights = () => (law.along === "mu0" ? law.values : [answer.inputs.mu0.value]);
   /** Both ends of what an interval or a deviation leaves open. */
   function band() {
-    const { mu_macro: mu, std, mu_macro_low: low, mu_macro_high: high } = law;
-    if (std) return [-1, 1].map((side) => mu.map((one, i) => Math.max(one + side * std[i], 0)));
+    const { mu_macro_low: low, mu_macro_high: high } = law;
     return low ? [low, high] : null;
   }
   /** What is drawn of the case itself. */

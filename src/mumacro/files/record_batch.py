@@ -197,8 +197,10 @@ def find_columns(
         name for name in necessary if name not in heads and (name != "omega" or "f" not in heads)
     ]:
         faults += _absent(missing, names)
-    deviations = any(column in heads for column in DEVIATIONS)
-    outputs = outputs_for(frozenset(names_in(include)), kind, deviations, ends == ENDS)
+    deviations = [column for column in DEVIATIONS if column in heads]
+    if deviations and ends == ENDS:
+        faults.append(f"there are both {deviations[0]} and an interval of k; leave one out")
+    outputs = outputs_for(frozenset(names_in(include)), kind, bool(deviations))
     band = BAND if ends == ENDS else ()
     answer_names = [DEFAULT[0], *band, *DEFAULT[1:], *paths_of(outputs, fields)]
     faults += [

@@ -125,6 +125,8 @@ class Cases(NamedTuple):
         columns, std, ends, units, f, gaps = _inputs(values, fields)
         if not values.keys().isdisjoint(DEVIATIONS):
             std |= _deviations(values, fields, std, gaps)
+        if std and ends is not None:
+            raise _deviation_beside_interval(values, next(iter(std)))
         shape = _shape_of(columns, std)
         faults = _by_case(gaps, shape, strict) if gaps else {}
         if shape:
@@ -595,6 +597,15 @@ def _deviations(
             value = deviation.si
         std[field] = per * value
     return std
+
+
+def _deviation_beside_interval(values: Mapping[str, Any], field: str) -> InputError:
+    """Return the error for an input with a deviation in a case whose k is an interval."""
+    names = (field, "f") if field == "omega" else (field,)
+    written = next(name for name in (*(f"std_{name}" for name in names), *names) if name in values)
+    absent = "left out" if written in DEVIATIONS else "without a deviation"
+    bound = f"{absent} beside an interval of k: give k with a deviation, or the rest without"
+    return InputError(written, values[written], bound)
 
 
 def _refuse_other_amplitude(values: Mapping[str, Any], kind: Kind) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mumacro.inputs.fields import INPUTS, RAD_PER_CYCLE
-from mumacro.inputs.units import Unit, parse_unit, plain, quantity_of
+from mumacro.inputs.units import Unit, parse_unit, plain, quantity_of, suit_unit
 from mumacro.kernel.arrays import Array, Bools
 from mumacro.results import REMARK, Note
 
@@ -126,7 +126,7 @@ def remarks_on_motion(
     >>> for size in (1.0, 0.0):
     ...     [remark] = remarks_on_motion(one, {"x": np.array([size])})
     ...     remark.row, remark.field, remark.text
-    ('units', 'x', 'x = 1 m, usual is 1e-12 to 0.02 m: is it in metres?')
+    ('units', 'x', 'x = 1 m, usual is 1 pm to 20 mm: is it in metres?')
     ('model', 'x', 'x = 0: the contact is not shaken, mu_macro is mu0')
     """
     found: list[Note] = []
@@ -253,12 +253,11 @@ def _sentence(
     else:
         typed = Unit("" if field.unit == "-" else field.unit)
         question = f"is it in {field.words}" if typed.symbol else "is it a number, not per cent"
-    least, most = field.usual
-    usual = (
-        f"{_number(least, typed)} to {_quantity(most, typed)}"
-        if least
-        else f"up to {_quantity(most, typed)}"
+    least, most = (
+        _quantity(bound, typed if field.unit == "-" else suit_unit(field.unit, bound))
+        for bound in field.usual
     )
+    usual = f"{least} to {most}" if field.usual[0] else f"up to {most}"
     word = names.get(name, name)
     return word, f"{word} = {_quantity(value, typed)}, usual is {usual}: {question}?"
 
@@ -274,15 +273,10 @@ def _is(name: str, word: str, value: float, units: Mapping[str, Unit]) -> str:
     return f"is {word} = {plain(value, 6)} in {INPUTS[name].unit}?"
 
 
-def _number(value: float, unit: Unit) -> str:
-    """Return a value in SI as a number of a unit."""
-    return plain(unit.scale.of_si(value), 6)
-
-
 def _quantity(value: float, unit: Unit) -> str:
-    """Return the value with the unit; a ratio has none."""
+    """Return a value in SI in a unit; a ratio has none."""
     symbol = "" if unit.symbol in ("-", "1") else unit.symbol
-    return f"{_number(value, unit)} {symbol}".rstrip()
+    return f"{plain(unit.scale.of_si(value), 6)} {symbol}".rstrip()
 
 
 def _largest(case: Mapping[str, float], *names: str) -> str:

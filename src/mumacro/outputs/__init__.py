@@ -28,6 +28,6 @@ MEMBERS: dict[str, Member] = {
     "mu_macro": Member("-", "Macroscopic coefficient of friction"),
     "mu_ratio": Member("-", "mu_macro/mu0, from 0 to 1"),
     "error_bound": Member("-", "Bound of the absolute error of mu_macro"),
-    BAND[0]: Member("-", "Smallest mu_macro over the interval of k"),
-    BAND[1]: Member("-", "Largest mu_macro over the interval of k"),
+    BAND[0]: Member("-", "Smallest mu_macro over the interval of k, in a law also over deviations"),
+    BAND[1]: Member("-", "Largest mu_macro over the interval of k, in a law also over deviations"),
 } | {path: member for output in OUTPUTS.values() for path, member in output.members.items()}

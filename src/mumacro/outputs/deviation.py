@@ -1,8 +1,10 @@
 """Compute the standard deviation of mu_macro from independent deviations of the inputs, to first
-order, and tell where first order is not enough."""
+order, the range in which it lies one deviation up and down, and tell where the two differ."""
 
 import math
+import sys
 from functools import reduce
+from typing import Any
 
 import numpy as np
 
@@ -46,28 +48,48 @@ def bent(cases: Evaluated, total: float) -> list[Note]:
         value = cases.columns[name]
         if not spread or value == math.inf:
             continue
-        up, down = (
-            cases.replace(**{name: value + step}).mu_macro - cases.mu_macro
-            for step in (spread, -spread)
-        )
+        up, down = (_with(cases, name, value + step) for step in (spread, -spread))
         straight = cases.gradient[name] * spread
         if math.isnan(down):
             least = "> 0" if name in POSITIVE else ">= 0"
             text = f"{name} less its deviation is not {least}: its distribution is not symmetric"
         elif max(abs(up - straight), abs(down + straight)) > STRAIGHT * total:
-            text = (
-                f"first order is not enough along {name}: one deviation up changes mu_macro by "
-                f"{up:+.3g}, one down by {down:+.3g}, the slope says {straight:+.3g}"
-            )
+            low, high = sorted((cases.mu_macro + up, cases.mu_macro + down))
+            text = f"± is rough for {name}: one deviation up and down gives {low:.3g} to {high:.3g}"
         else:
             continue
         remarks.append(Note(REMARK, text, "std", name))
     return remarks
 
 
-_ONE_K = (
-    "it needs one k: give k with its standard deviation, or an interval of k without deviations"
-)
+def _with(cases: Evaluated, name: str, value: Any) -> Any:
+    """Return by how much mu_macro changes if one input has another value; NaN if it cannot."""
+    return cases.replace(**{name: value}).mu_macro - cases.mu_macro
+
+
+def one_deviation(cases: Evaluated) -> tuple[Any, Any]:
+    """Return mu_macro (n,) at its lowest and at its highest one deviation up and down.
+
+    Each input is set one deviation up and down, down to its smallest legal value.  The changes of
+    several inputs are added as independent ones, those up apart from those down.  The slope says
+    the change where an input cannot have the value, because the contact lifts off.
+    """
+    fall, rise = np.zeros_like(cases.mu_macro), np.zeros_like(cases.mu_macro)
+    for name, spread in cases.cases.std.items():
+        value, straight = cases.columns[name], cases.gradient[name] * spread
+        least = sys.float_info.min if name in POSITIVE else 0.0
+        steps = [
+            np.where(np.isnan(change), slope, change)
+            for change, slope in (
+                (_with(cases, name, value + spread), straight),
+                (_with(cases, name, np.maximum(value - spread, least)), -straight),
+            )
+        ]
+        fall = np.hypot(fall, np.minimum(np.minimum(*steps), 0.0))
+        rise = np.hypot(rise, np.maximum(np.maximum(*steps), 0.0))
+    return np.maximum(cases.mu_macro - fall, 0.0), cases.mu_macro + rise
+
+
 STD = Output(
     "std",
     std,
@@ -78,6 +100,5 @@ STD = Output(
     | {f"std_share.{name}": Member("-", f"Share of {name}") for name in ALL_FIELDS},
     cost=8,
     gradient=True,
-    lacks={"interval": _ONE_K},
     parts={"std_share": "Share of each input in the variance, 0 to 1"},
 )

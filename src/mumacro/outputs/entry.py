@@ -30,8 +30,7 @@ class Output(NamedTuple):
     #: the same for a ball, if it differs from that of a spring
     cost_of_ball: float | None = None
     gradient: bool = False  #: whether it needs the derivatives of mu_macro
-    #: a direction, or "interval" for an interval of k, for which the output does not exist -> the
-    #: reason
+    #: a direction for which the output does not exist -> the reason
     lacks: Mapping[str, str] = {}
     #: by the name of a group of values, such as ``power_bound``: its meaning, and where it is NaN
     parts: Mapping[str, str] = {}

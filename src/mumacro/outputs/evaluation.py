@@ -55,24 +55,22 @@ def chosen(
     names = () if type(include) is tuple and not include else names_in(include)
     if not names and not gradient and not cases.std:
         return ()
-    has_ends = cases.ends is not None
-    return outputs_for(frozenset(names), cases.kind, bool(cases.std), has_ends, bool(gradient))
+    return outputs_for(frozenset(names), cases.kind, bool(cases.std), bool(gradient))
 
 
 @cache
 def outputs_for(
-    names: frozenset[str], kind: Kind, deviations: bool, interval: bool, gradient: bool = False
+    names: frozenset[str], kind: Kind, deviations: bool, gradient: bool = False
 ) -> tuple[Output, ...]:
-    """Return the same from the properties of the cases on which it depends: whether they have
-    deviations, and intervals of k."""
+    """Return the same from the properties of the cases on which it depends, ``deviations`` whether
+    they have any."""
     if "std" in names and not deviations:
         bound = "without std where no input has a deviation: give one, such as std_k"
         raise InputError("include", "std", bound)
     wanted = {*names, *["gradient"] * gradient, *["std"] * deviations}
     outputs = tuple(output for name, output in OUTPUTS.items() if name in wanted)
-    lacking = {*kind.names.values()} | ({"interval"} if interval else set())
     for output in outputs:
-        for word in lacking & output.lacks.keys():
+        for word in output.lacks.keys() & {*kind.names.values()}:
             bound = f"without {output.name} for {word}: {output.lacks[word]}"
             raise InputError("include", output.name, bound)
     return outputs

@@ -4,6 +4,7 @@ limit and borders."""
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -29,6 +30,8 @@ from mumacro.inputs.stiffening import Stiffening, stiffening_of
 from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.outputs.answer import BAND, Answer
+from mumacro.outputs.deviation import one_deviation
+from mumacro.outputs.evaluated import Evaluated
 from mumacro.outputs.evaluation import chosen
 from mumacro.questions.borders import Crossing, border_crossings
 from mumacro.questions.input_curve import InputCurve
@@ -67,16 +70,15 @@ class Law(Result):
         six = {**self.case, name: per * self.values}
         return six if self.stiffening is None else six | self.stiffening.scaled(six, self.values)
 
-    @property
+    @cached_property
     def band(self) -> tuple[Array, Array] | None:
-        """Return the smallest and the largest mu_macro over an interval of k [-], or mu_macro minus
-        and plus its standard deviation, (n,) each.  Return None if no input is uncertain."""
+        """Return the smallest and the largest mu_macro [-], (n,) each, over an interval of k, or
+        one deviation up and down of the uncertain inputs.  Return None if no input is uncertain."""
+        if self.std is not None:
+            tabulated = self.answer._surrogate.tabulated
+            return one_deviation(Evaluated(tabulated, self.answer.cases, "gradient"))
         low, high = (getattr(self.answer, name, None) for name in BAND)
-        if low is not None and high is not None:
-            return low, high
-        if self.std is None:
-            return None
-        return self.answer.mu_macro - self.std, self.answer.mu_macro + self.std
+        return None if low is None or high is None else (low, high)
 
     @property
     def std(self) -> Array | None:
@@ -88,11 +90,18 @@ class Law(Result):
     @property
     def columns(self) -> dict[str, Any]:
         """Return the law as a table: column -> values (n,), the swept input first."""
-        uncertain = ("std",) if self.std is not None else BAND if self.band else ()
-        names = ["mu_macro", *uncertain, "regime", "error_bound", "source"]
-        answer_columns = {name: self.answer[name] for name in names}
         k = {} if self.stiffening is None else {"k": self.inputs["k"]}
-        return {self.along: self.values, **k, **answer_columns, "mu_static": self.mu_static}
+        std = {} if self.std is None else {"std": self.std}
+        band = {} if self.band is None else dict(zip(BAND, self.band, strict=True))
+        return {
+            self.along: self.values,
+            **k,
+            "mu_macro": self.answer.mu_macro,
+            **std,
+            **band,
+            **{name: self.answer[name] for name in ("regime", "error_bound", "source")},
+            "mu_static": self.mu_static,
+        }
 
     def _members(self) -> dict[str, Any]:
         columns = {name: x for name, x in self.columns.items() if name != self.along}

@@ -788,7 +788,7 @@ def test_a_turn_within_one_step_ends_no_period(tolerance: float) -> None:
 def test_every_amplitude_of_a_motion_is_doubted_as_y0(capsys: Capture, part: str) -> None:
     [remark] = motion(**RIG | {part: 1.0}).remarks
     assert (remark["row"], remark["field"], remark["cases"]) == ("units", part, 1)
-    assert remark["text"] == f"{part} = 1 m, usual is 1e-12 to 0.02 m: is it in metres?"
+    assert remark["text"] == f"{part} = 1 m, usual is 1 pm to 20 mm: is it in metres?"
     many = motion(**RIG | {part: np.array([1e-6, 1.0, 2.0])})
     assert many.remarks[0]["cases"] == 2
     assert many.to_dict()["remarks"] == many.remarks

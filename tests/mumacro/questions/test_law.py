@@ -200,13 +200,48 @@ def test_a_deviation_is_that_of_each_case(surrogate: Surrogate, uncertain: Any) 
     law = friction_law(surrogate, values=SPEEDS, **case)
     each = surrogate.evaluate(**case, v0=law.values)
     assert law.std == close(each["std"], rel=1e-12)
-    assert law.band is not None
-    assert law.band[1] - law.band[0] == close(2.0 * each["std"], rel=1e-9)
+    low, high = law.band
+    assert (low < law.answer.mu_macro).all()
+    assert (law.answer.mu_macro < high).all()
+    assert [*law.columns][:5] == ["v0", "mu_macro", "std", "mu_macro_low", "mu_macro_high"]
     exact = friction_law(surrogate, values=SPEEDS, **{**LINE, "k": 1e6, "mu0": 0.3})
     assert law.answer.mu_macro.tolist() == exact.answer.mu_macro.tolist()
     assert exact.std is None
     assert exact.band is None
     assert law.to_dict()["std"] == law.columns["std"].tolist()
+
+
+@every_pair
+def test_the_band_of_one_deviation_is_between_what_friction_is_there(
+    surrogate: Surrogate, pair: Any
+) -> None:
+    law, words, case = law_of(surrogate, pair, {"k": "1.5 ± 0.6 N/um"})
+    ends = [
+        surrogate.evaluate(**{**without(case, "k"), "k": k}, **words, v0=law.values).mu_macro
+        for k in (0.9e6, 1.5e6, 2.1e6)
+    ]
+    low, high = law.band
+    assert low == close(np.min(ends, axis=0), rel=1e-12, abs=1e-15)
+    assert high == close(np.max(ends, axis=0), rel=1e-12)
+    assert (high <= case["mu0"] * (1.0 + 1e-12)).all()
+
+
+def test_small_deviations_make_a_band_of_twice_their_deviation(surrogate: Surrogate) -> None:
+    law = friction_law(surrogate, values=SPEEDS, **LINE, std_k=30.0, std_y0=1e-10, std_Fz=1e-4)
+    assert law.band[1] - law.band[0] == close(2.0 * law.std, rel=1e-3)
+
+
+def test_the_band_ends_where_an_input_cannot_go_further(surrogate: Surrogate) -> None:
+    case = {**LINE, "k": 1e6}
+    soft = friction_law(surrogate, values=SPEEDS, **case, std_k=3e6)  # down to no stiffness at all
+    assert soft.band[1] == close(np.full(SPEEDS.size, case["mu0"]), rel=1e-12)
+    assert (soft.band[0] >= 0.0).all()
+    load = {**without(case, "y0"), "Fz_amplitude": 9.0, "direction": "normal"}
+    lifting = friction_law(surrogate, values=SPEEDS, **load, std_Fz_amplitude=2.0)
+    assert np.isfinite(lifting.band).all()  # 11 N of 10 N: the contact lifts off
+    slope = surrogate.evaluate(**load, v0=SPEEDS, gradient=True).gradient["Fz_amplitude"]
+    least = np.maximum(lifting.answer.mu_macro + 2.0 * slope, 0.0)
+    assert lifting.band[0] == close(least, rel=1e-9, abs=1e-12)
 
 
 def test_the_deviation_of_k_grows_with_k(surrogate: Surrogate) -> None:
