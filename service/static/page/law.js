@@ -157,8 +157,13 @@ export function lawPanel(store, moved) {
     );
     const ends = band();
     if (ends) range(places, ...ends, "band");
+    // at a border the curve may be steep
+    const steep = law.border.map(({ value, mu_macro: mu }) => [
+      toUnit(law.along, value, unit()),
+      mu,
+    ]);
     plot.path(
-      places.map((x, i) => [x, law.mu_macro[i]]),
+      [...places.map((x, i) => [x, law.mu_macro[i]]), ...steep].sort(([a], [b]) => a - b),
       "curve",
     );
     for (const { value } of law.border) {

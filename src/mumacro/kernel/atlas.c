@@ -88,6 +88,7 @@ enum {
     MU_ALONG_REVERSES,
     MU_NORMAL_SLIDES,
     MU_NORMAL_STICKS,
+    MU_RIGID_REVERSES,
     MU_SOURCES,
     MU_OTHER = MU_SOURCES /* not placed yet: zero, extreme or illegal inputs, and y~ > MU_Y_TAIL */
 };
@@ -437,6 +438,7 @@ static const mumacro_source MU_CLOSED_FORM[MU_SOURCES - MU_CHARTS] = {
     {"along_reverse_slip", MU_REVERSE_SLIP},
     {"normal_continuous", MU_CONTINUOUS},
     {"normal_stick_slip", MU_STICK_SLIP},
+    {"rigid_reverse_slip", MU_REVERSE_SLIP},
 };
 static const char *const MU_REGIME_NAME[MU_REGIMES] = {
     "continuous", "stick_slip", "static", "partial_slip", "reverse_slip",

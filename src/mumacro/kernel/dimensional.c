@@ -53,6 +53,7 @@ static double mu_rigid_slope(int direction, double r) {
 static mu_answer mu_any_case(const mumacro_data *data, int contact, int direction,
                              const mu_inputs *in, double *v, double *y, mu_slopes *at) {
     double r, mu;
+    int source;
     *v = *y = NAN;
     if (mu_first_bad(direction, in)) return mu_limit(NAN, NAN, -1);
     mu_groups(direction, in, v, y);
@@ -73,14 +74,15 @@ static mu_answer mu_any_case(const mumacro_data *data, int contact, int directio
         return answer;
     }
     r = mu_amplitude_ratio(in);
-    if (r == 0.0) return mu_limit(1.0, MU_RIGID_ROUNDING, MU_RIGID);
+    source = direction == MU_ALONG && r > 1.0 ? MU_RIGID_REVERSES : MU_RIGID;
+    if (r == 0.0) return mu_limit(1.0, MU_RIGID_ROUNDING, source);
     /* eq. (35) is 2.5e-306 there */
-    if (r == HUGE_VAL) return mu_limit(0.0, 3.0 * MU_DENORMAL, MU_RIGID);
+    if (r == HUGE_VAL) return mu_limit(0.0, 3.0 * MU_DENORMAL, source);
     mu = mu_rigid_ratio(direction, r);
     /* y~ beyond double range: only the outer solution is left, corrected by
      * the layers when v~ is not large */
     return mu_limit(mu, MU_RIGID_ROUNDING * mu + (in->k == HUGE_VAL || *v > 1e150 ? 0.0 : mu),
-                    MU_RIGID);
+                    source);
 }
 
 /* What the chain rule takes of each case: mu~ and its slopes along ln v~ and
@@ -163,7 +165,8 @@ static void mu_gradient(const mumacro_data *data, int contact, int direction, co
                         int64_t stride) {
     const double mu0 = in->mu0, six[6] = {in->mu0, in->Fz, in->k, in->y0, in->omega, in->v0};
     double *error = out + 6 * stride;
-    if (answer.source != -1 && answer.source != MU_RIGID && answer.source != MU_NO_OSCILLATION &&
+    const int rigid = answer.source == MU_RIGID || answer.source == MU_RIGID_REVERSES;
+    if (answer.source != -1 && !rigid && answer.source != MU_NO_OSCILLATION &&
         !(answer.source == MU_STATIC_LIMIT && y == HUGE_VAL)) {
         const mu_slopes at = slopes ? *slopes : mu_slopes_as(data, contact, direction, v, y);
         double inputs[6][MU_CHUNK], terms[MU_TERMS][MU_CHUNK];
@@ -182,7 +185,7 @@ static void mu_gradient(const mumacro_data *data, int contact, int direction, co
     out[0] = answer.value;
     error[0] = answer.bound;
     if (answer.source == MU_STATIC_LIMIT) out[5 * stride] = error[5 * stride] = HUGE_VAL;
-    if (answer.source == MU_RIGID) {
+    if (rigid) {
         const double rounding = 8.0 * MU_ROUNDING * answer.value;
         const double all = rounding + (answer.bound > rounding ? answer.bound : 0.0);
         const int oscillates = answer.value < 1.0 || in->y0 * in->omega > 0.0;

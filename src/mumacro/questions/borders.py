@@ -38,9 +38,11 @@ def border_crossings(curve: InputCurve, low: float, high: float) -> tuple[Crossi
     begins or ends, ascending.
 
     The border of continuous sliding is crossed at most once, or twice (across, over mu0, Fz or k).
-    A rigid contact never sticks, and without oscillation there is no border, so the list is empty.
+    The list is empty without oscillation, and for a rigid contact, unless it is shaken along: it
+    never sticks.
     """
-    if curve.case.get("k") == math.inf or 0.0 in curve.case.values() or curve.proportional:
+    rigid = curve.case.get("k") == math.inf and not curve.kind.direction
+    if rigid or 0.0 in curve.case.values() or curve.proportional:
         return ()
     low = max(low, TINY)  # at 0 there is no oscillation or no sliding
     # On a ray v~/v~crit(y~) is smallest at STEEPEST_Y, where d ln v~crit / d ln y~ = 1.  The

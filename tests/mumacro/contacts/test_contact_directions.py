@@ -82,6 +82,9 @@ def test_rigid_contact_is_the_mean_direction_of_slip_and_the_limit_of_stiff_ones
 ) -> None:
     case = {**CASE, "v0": ratio * CASE["y0"] * CASE["omega"]}
     rigid = table.evaluate(**{**case, "k": "rigid"}, **ALONG, gradient=True)
+    if ratio != 1.0:
+        stiff = table.evaluate(**{**case, "k": 1e18}, **ALONG)
+        assert rigid.regime == stiff.regime == ("reverse_slip" if ratio < 1.0 else "continuous")
     assert rigid.mu_macro == close(0.3 * 2.0 / math.pi * math.asin(min(ratio, 1.0)), rel=1e-15)
     assert table.evaluate(**{**case, "k": 1e18}, **ALONG).mu_macro == close(
         rigid.mu_macro, abs=1e-6 if ratio < 1.0 else 1e-3

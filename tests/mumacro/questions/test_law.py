@@ -197,7 +197,7 @@ def test_the_ends_of_an_interval_may_stand_in_lists_of_one(surrogate: Surrogate)
 )
 def test_a_deviation_is_that_of_each_case(surrogate: Surrogate, uncertain: Any) -> None:
     case = {**without(LINE, "k"), **uncertain}
-    law = friction_law(surrogate, values=SPEEDS, **case)
+    law: Any = friction_law(surrogate, values=SPEEDS, **case)
     each = surrogate.evaluate(**case, v0=law.values)
     assert law.std == close(each["std"], rel=1e-12)
     low, high = law.band
@@ -227,17 +227,19 @@ def test_the_band_of_one_deviation_is_between_what_friction_is_there(
 
 
 def test_small_deviations_make_a_band_of_twice_their_deviation(surrogate: Surrogate) -> None:
-    law = friction_law(surrogate, values=SPEEDS, **LINE, std_k=30.0, std_y0=1e-10, std_Fz=1e-4)
+    law: Any = friction_law(surrogate, values=SPEEDS, **LINE, std_k=30.0, std_y0=1e-10, std_Fz=1e-4)
     assert law.band[1] - law.band[0] == close(2.0 * law.std, rel=1e-3)
 
 
 def test_the_band_ends_where_an_input_cannot_go_further(surrogate: Surrogate) -> None:
     case = {**LINE, "k": 1e6}
-    soft = friction_law(surrogate, values=SPEEDS, **case, std_k=3e6)  # down to no stiffness at all
+    soft: Any = friction_law(
+        surrogate, values=SPEEDS, **case, std_k=3e6
+    )  # down to no stiffness at all
     assert soft.band[1] == close(np.full(SPEEDS.size, case["mu0"]), rel=1e-12)
     assert (soft.band[0] >= 0.0).all()
     load = {**without(case, "y0"), "Fz_amplitude": 9.0, "direction": "normal"}
-    lifting = friction_law(surrogate, values=SPEEDS, **load, std_Fz_amplitude=2.0)
+    lifting: Any = friction_law(surrogate, values=SPEEDS, **load, std_Fz_amplitude=2.0)
     assert np.isfinite(lifting.band).all()  # 11 N of 10 N: the contact lifts off
     slope = surrogate.evaluate(**load, v0=SPEEDS, gradient=True).gradient["Fz_amplitude"]
     least = np.maximum(lifting.answer.mu_macro + 2.0 * slope, 0.0)
@@ -247,7 +249,7 @@ def test_the_band_ends_where_an_input_cannot_go_further(surrogate: Surrogate) ->
 def test_the_deviation_of_k_grows_with_k(surrogate: Surrogate) -> None:
     case = {**without(LINE, "k", "Fz"), "v0": 0.01, "contact": "ball"}
     loads = [1.0, 10.0, 1e3]
-    law = friction_law(surrogate, "Fz", values=loads, Fz=10.0, k="1 ± 0.1 N/um", **case)
+    law: Any = friction_law(surrogate, "Fz", values=loads, Fz=10.0, k="1 ± 0.1 N/um", **case)
     k = law.columns["k"]
     each = surrogate.evaluate(**case, Fz=law.values, k=k, std_k=0.1 * k)
     assert law.std == close(each["std"], rel=1e-9)
@@ -405,6 +407,18 @@ def test_extreme_inputs_give_numbers_or_nan_and_no_warning(
     ):
         assert column.shape == values.shape
     assert (law.answer.mu_macro <= (law.values if along == "mu0" else 0.3)).all()
+
+
+@pytest.mark.parametrize("contact", ["spring", "ball"])
+def test_a_rigid_contact_along_has_its_border_at_the_peak_speed(
+    surrogate: Surrogate, contact: str
+) -> None:
+    case = {**without(CASE, "v0"), "k": "rigid", "direction": "along", "contact": contact}
+    peak = CASE["y0"] * CASE["omega"]
+    [mark] = friction_law(surrogate, values=[0.5 * peak, 2.0 * peak], **case).border
+    assert mark.value == close(peak, rel=1e-15)
+    assert mark.mu_macro == CASE["mu0"]
+    assert mark.regimes == ("reverse_slip", "continuous")
 
 
 def test_what_never_sticks_has_no_border_and_rigid_contact_its_own_law(
