@@ -467,6 +467,23 @@ def test_a_unit_in_a_number_format_and_a_formula_without_a_value_are_rejected(
     assert reason in row["reason"]
 
 
+def test_a_formula_is_found_wherever_it_stands_in_its_sheet(tmp_path: Path) -> None:
+    """Also across the end of a piece that is searched at once, 1 MiB."""
+    row = [*CASE_ROWS[1][:3], "=A2*2", *CASE_ROWS[1][4:]]
+    path, moved = sheets(tmp_path / "c.xlsx", Data=[CASE_ROWS[0], row]), tmp_path / "moved.xlsx"
+    with zipfile.ZipFile(path) as parts, zipfile.ZipFile(moved, "w") as out:
+        for part in parts.infolist():
+            data = parts.read(part)
+            if b"<f>" in data:
+                blanks = b" " * (2**20 - 1 - data.index(b"<f>") - len(b"<!---->"))
+                data = data.replace(b"<sheetData>", b"<!--%s--><sheetData>" % blanks)
+                assert data.index(b"<f>") == 2**20 - 1
+            out.writestr(part, data)
+    assert evaluate_files([moved], tmp_path / "out.csv", TABLE).rejected == 1
+    (reject,) = rows_of(tmp_path / "out.csv.rejects.csv")
+    assert "is a formula without a value" in reject["reason"]
+
+
 def test_options_count_for_workbooks(tmp_path: Path) -> None:
     cells: list[Any] = ["0,3", 10, 1e6, 2e-6, "20.000", 0.01]
     path = sheets(tmp_path / "c.xlsx", Data=[["v0", "mu0"], *CASE_ROWS[:1], cells, ["mean"]])

@@ -27,6 +27,7 @@ from mumacro.inputs.cells import BLANKS, GAPS, Signs, evidence, numbers_of
 from mumacro.inputs.decoding import Text
 from mumacro.inputs.layout import Dialect
 from mumacro.inputs.names import ColumnNames, absent
+from mumacro.inputs.text_tables import Most
 from mumacro.inputs.whole_tables import TableOfNumbers, read_numbers
 from tests.support.comparing import close
 
@@ -422,6 +423,12 @@ def test_the_same_head_again_is_left_out_and_said(head: str) -> None:
     assert len(table.skipped) == head.count("\n")
 
 
+def test_of_many_heads_the_first_five_are_named() -> None:
+    head = "v0 [mm/s],mu_macro\n1,0.2\n"
+    assert read(6 * head).read_as.endswith("again in lines 3, 5, 7, 9, 11, left out")
+    assert read(8 * head).read_as.endswith("again in lines 3, 5, 7, 9, 11 and 2 more, left out")
+
+
 # --- bad input ------------------------------------------------------------------------------------
 
 
@@ -525,6 +532,18 @@ def test_a_sparse_file_of_two_gigabytes_is_not_read_to_its_end(
     with pytest.raises(TextError, match=fault):
         read_points(path)
     path.unlink()
+
+
+def test_a_table_may_be_as_large_as_its_limits() -> None:
+    data = b"v0,mu_macro,a\n" + 3 * b"1,0.2,abc\n"
+    assert len(read_points(data, Dialect(), Most(rows=3, columns=3, cell=8)).lines) == 3
+    for most, fault in (
+        (Most(rows=2), "line 4: there are more than 2 rows"),
+        (Most(columns=2), "line 1: there may be up to 2 columns"),
+        (Most(cell=7), "line 1: a cell may have up to 7 characters"),
+    ):
+        with pytest.raises(TextError, match=fault):
+            read_points(data, Dialect(), most)
 
 
 def test_millions_of_empty_lines_are_counted_and_not_kept() -> None:
