@@ -179,6 +179,17 @@ def test_the_gradient_and_its_bound_follow_from_the_slopes(fine: Surrogate) -> N
         np.testing.assert_allclose(answer.gradient_bound[name], scale * bound, rtol=1e-9)
 
 
+def test_the_slope_along_a_huge_amplitude_is_that_of_the_values(fine: Surrogate) -> None:
+    """There the last piece of the border tells how a coordinate changes with y~."""
+    y, steps = np.geomspace(1.4e5, 1e7, 40), 2.0**-7 * np.array([-3, -2, -1, 1, 2, 3])
+    for share in (0.3, 0.8):
+        v = share * fine.v_tilde_crit(y)
+        values, _, _ = fine.quantity("mu_ratio", v[:, None], y[:, None] * np.exp(steps))
+        slope = values @ np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0 * 2.0**7
+        rows = fine.slopes(v, y, bounds=True)
+        assert np.all(np.abs(rows[2] - slope) <= rows[4] + 1e-15)
+
+
 def closed_form(mu0: Any, Fz: Any, k: Any, y0: Any, omega: Any, v0: Any) -> Any:
     """mu_macro in 40 digits: eq. (35) for rigid contact, creep to first order in v0 for an elastic
     one below y~ = 1."""
