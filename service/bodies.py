@@ -129,7 +129,7 @@ async def small_body(request: Request) -> bytes:
         refuse(
             [
                 FieldFault((name,), "belongs in the body", value, parameter=True)
-                for name, value in pairs[:100]
+                for name, value in pairs
             ]
         )
     return body

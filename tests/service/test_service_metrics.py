@@ -1,6 +1,7 @@
 """Counters: their values, over all code paths and all workers."""
 
 import _thread
+import asyncio
 import json
 import os
 import re
@@ -16,6 +17,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from mumacro import Surrogate
 from service import metrics as metrics_of
+from service.admission import threads_end
 from service.metrics import NOW
 from tests.support.cases import CASE, Case
 
@@ -188,6 +190,7 @@ def test_a_slot_is_given_back_when_its_thread_cannot_start_and_counters_need_non
         for _ in range(20):
             assert fresh.post("/v1/law", json=law).status_code == 503
     assert fresh.app.state.admission.slots == 0
+    assert asyncio.run(threads_end(60.0))  # a stop waits for none of them
     assert fresh.post("/v1/law", json=law).status_code == 200
     monkeypatch.setattr(type(fresh.app.state.admission), "slots", 8)
     assert fresh.post("/v1/law", json=law).status_code == 503
