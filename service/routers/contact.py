@@ -1,14 +1,13 @@
 """Answer questions about a contact: ``POST /v1/stiffness``, from materials and geometry; ``POST
 /v1/fit``, from measured points."""
 
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fastapi import Request, Response
 
-import mumacro
 from mumacro.errors import InputError, TextError
+from mumacro.fits.fit import best_fit
 from mumacro.fits.measured_points import read_points, unknowns_beside
 from mumacro.inputs.text_tables import Most
 from mumacro.inputs.whole_tables import TableOfNumbers
@@ -105,9 +104,7 @@ def _fitted(
             unknowns = unknowns_beside(columns)
         account = {"read_as": points.read_as, "skipped_lines": points.skipped}
     try:
-        with warnings.catch_warnings():  # they are in the answer
-            warnings.simplefilter("ignore")
-            fit = mumacro.fit(columns, unknowns, surrogate=table.surrogate, **words)
+        fit = best_fit(columns, unknowns, surrogate=table.surrogate, **words)
     except InputError as error:
         if points is None or error.index is None:
             raise

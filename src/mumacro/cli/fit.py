@@ -1,13 +1,12 @@
 """Run ``mumacro fit``: fit k and mu0 to measured points in a file."""
 
-import warnings
 from collections.abc import Sequence
 
 from mumacro import plotting
 from mumacro.cli import common
 from mumacro.cli.common import OneLineParser, UsageError, open_table
 from mumacro.cli.table_format import add_format, dialect_in, fit_to, read_file, say_how_read
-from mumacro.fits.fit import fit
+from mumacro.fits.fit import best_fit
 from mumacro.fits.fitted import Fit
 from mumacro.fits.measured_points import STD, UNKNOWNS, read_points, unknowns_beside
 from mumacro.inputs.fields import AMPLITUDE, kind_of
@@ -64,9 +63,7 @@ def run(words: Sequence[str]) -> str:
     surrogate = open_table(options.table)
 
     def fitted() -> Fit:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # they are in the result
-            return fit(table.columns, unknown, **kind.names, surrogate=surrogate, **case.inputs)
+        return best_fit(table.columns, unknown, **kind.names, surrogate=surrogate, **case.inputs)
 
     result = fit_to(options.points, table, fitted, {})
     columns = {

@@ -30,7 +30,6 @@ _SOFT = {"across": 1e-4, "along": 1e-6, "normal": 1e-6}
 _NARROW = 1e-6
 
 
-@np.errstate(all="ignore")
 def fit(
     data: Any,
     unknowns: str | Sequence[str] | None = None,
@@ -80,11 +79,27 @@ def fit(
     >>> f"{result.values['k']:.2g} {result.values['mu0']:.3f}"
     '1e+06 0.300'
     """
-    table = surrogate or Surrogate.open()
-    result = _Problem(data, unknowns, contact, direction, table, fixed).solve()
+    words = {"contact": contact, "direction": direction}
+    result = best_fit(data, unknowns, surrogate=surrogate, **words, **fixed)
     for text in result.warnings:
-        warnings.warn(text, stacklevel=3)  # errstate wraps this function
+        warnings.warn(text, stacklevel=2)
     return result
+
+
+@np.errstate(all="ignore")
+def best_fit(
+    data: Any,
+    unknowns: str | Sequence[str] | None = None,
+    *,
+    contact: str = "spring",
+    direction: str = "across",
+    surrogate: Surrogate | None = None,
+    **fixed: Any,
+) -> Fit:
+    """Return the result of :func:`fit`, and issue no warnings: Python has one filter of them for
+    all threads."""
+    table = surrogate or Surrogate.open()
+    return _Problem(data, unknowns, contact, direction, table, fixed).solve()
 
 
 class _Minimum(NamedTuple):
