@@ -23,6 +23,7 @@ from mumacro.kernel.threads import STOP, StopError
 from service import admission as admissions
 from service import batch, tables
 from service.admission import Admission
+from service.bodies import within
 from service.problems import RequestError
 from tests.support.admitting import run
 from tests.support.places import ROOT, TABLES
@@ -276,6 +277,23 @@ def test_a_small_batch_that_asks_for_much_is_computed_in_a_thread(
             body = {**CASE, "v0": [0.01] * 2, "contact": "ball", "include": include}
             assert client.post("/v1/mu-macro/batch", json=body).status_code == 200
             assert slots.pop() == slot
+
+
+def test_the_last_piece_of_a_batch_is_sent_without_a_slot(
+    started: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A client that reads it slowly keeps no other one from computing."""
+    slots = list[int]()
+    with started() as client:
+
+        async def watched(limit: int, move: Any, *kind: Any) -> Any:
+            slots.append(client.app.state.admission.slots)
+            return await within(limit, move, *kind)
+
+        monkeypatch.setattr("service.routers.batch.within", watched)
+        body = {**CASE, "v0": [0.01] * 20_000}
+        assert client.post("/v1/mu-macro/batch", json=body).status_code == 200
+    assert slots[-3:] == [1, 1, 0]
 
 
 SEARCH = {

@@ -91,6 +91,29 @@ def test_targets_keep_their_order_and_unreachable_ones_have_a_reason(client: Any
     assert "no influence" in result["reason"]
 
 
+def test_a_target_as_a_ratio_is_that_of_its_friction_also_at_the_ends_of_k(client: Any) -> None:
+    case = {
+        **SOLVE,
+        "unknown": "v0",
+        "y0": 2e-6,
+        "v0": ...,
+        "k": ...,
+        "k_low": 8e5,
+        "k_high": 1.25e6,
+    }
+    friction = answered(client, "solve-for", case, target=[0.24])
+    ratio = answered(client, "solve-for", case, target=[0.8], quantity="mu_ratio")
+    assert len(ratio["ends"]) == 2
+    for mine, other in zip((ratio, *ratio["ends"]), (friction, *friction["ends"]), strict=True):
+        (one,), (expected,) = mine["results"], other["results"]
+        assert (one["target"], expected["target"]) == (0.8, 0.24)
+        assert [root["value"] for root in one["roots"]] == close(
+            [root["value"] for root in expected["roots"]], rel=1e-12
+        )
+        for end in ("min", "max"):
+            assert mine["reachable"][end] == close(other["reachable"][end] / 0.3, rel=1e-12)
+
+
 @pytest.mark.parametrize(
     "case",
     [
@@ -139,9 +162,11 @@ def test_a_law_is_the_librarys(client: Any, surrogate: Surrogate, case: Any) -> 
         assert answer[name] == (close(column, rel=1e-14) if name == "mu_macro" else column)
 
 
-def test_the_table_for_spreadsheets_is_the_law(client: Any) -> None:
-    law = answered(client, "law", LAW, y0=1e-5, include=["power"])
-    response = client.get("/v1/law.csv", params={**LAW, "y0": 1e-5, "include": "power"})
+@pytest.mark.parametrize("k", [1e6, "rigid"])  # a rigid contact has no power of the shaker
+def test_the_table_for_spreadsheets_is_the_law(client: Any, k: Any) -> None:
+    law = answered(client, "law", LAW, k=k, y0=1e-5, include=["power"])
+    assert (None in law["power"]["oscillation"]) is (k == "rigid")
+    response = client.get("/v1/law.csv", params={**LAW, "k": k, "y0": 1e-5, "include": "power"})
     assert response.headers["content-type"].startswith("text/csv")
     assert 'filename="friction-law-v0.csv"' in response.headers["content-disposition"]
     columns = {
@@ -163,6 +188,9 @@ def test_the_table_for_spreadsheets_is_the_law(client: Any) -> None:
             "" if x is None else x if isinstance(x, str) else repr(x) for x in columns[name]
         )
     assert response.text.count("\r\n") == 34
+
+
+def test_a_table_for_spreadsheets_has_a_unit_in_every_head_of_numbers(client: Any) -> None:
     for direction, amplitude in (("across", "y0"), ("normal", "Fz_amplitude")):
         names = ",".join(name for name, one in OUTPUTS.items() if direction not in one.lacks)
         rest = {name: x for name, x in LAW.items() if name != "y0"} | {amplitude: 1e-6}
