@@ -112,7 +112,7 @@ REFUSED = [
             ({**RANGE, "k_low": 1e6, "k_high": "rigid"}, "k_high"),
             ({**NORMAL, "include": ["power"]}, "include"),
             ({"direction": "along", "include": ["settling"]}, "include"),
-            ({**RANGE, "include": ["std"], "std_v0": 1e-3}, "include"),
+            ({**RANGE, "include": ["std"], "std_v0": 1e-3}, "std_v0"),
             ({**NORMAL, "std_y0": 1e-6}, "std_y0"),
         )
     ),
