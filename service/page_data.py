@@ -78,6 +78,11 @@ _WIDTH, _HEIGHT = 141, 101  # points of the map's grid, twenty a decade
 _UNIT = 1e-4  # unit of the map's integers; a shade of colour is a hundred times coarser
 
 
+_RIGID_ANY = (
+    "Any motion of a rigid contact is the limit of a large k: raise k until µ stays the same."
+)
+
+
 def _impossible(contact: str, direction: str) -> str:
     """Return why a contact cannot have a direction, or an empty text if it can."""
     try:
@@ -121,7 +126,8 @@ def names(built: bool) -> dict[str, Any]:
         "contacts": {name: name for name in _CHOICES["contact"]},
         "directions": {name: name for name in _CHOICES["direction"]},
         "choices": _CHOICES,
-        "impossible": {" ".join(kind): reason for kind, reason in reasons.items() if reason},
+        "impossible": {" ".join(kind): reason for kind, reason in reasons.items() if reason}
+        | {"rigid any": _RIGID_ANY},
         "outputs": {" ".join(kind): _outputs_of(kind) for kind in kinds if not reasons[kind]},
         "lacks": {" ".join(kind): _lacks(kind) for kind in kinds if not reasons[kind]},
         "regimes": {name: plotting.REGIMES[name].words for name in REGIMES},

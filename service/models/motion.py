@@ -233,6 +233,9 @@ class CycleColumns(BaseModel):
     Fx: Numbers = quantity("Force on it along", "N")
     Fy: Numbers = quantity("Force on it across", "N")
     Fz: list[float] = quantity("Normal force", "N")
+    share: list[float] = quantity(
+        "Size of the force along and across over mu0 Fz: 1 while a spring slips", "-"
+    )
 
 
 class MotionAnswer(BaseModel):

@@ -70,7 +70,7 @@ def test_what_was_understood_stands_in_the_label(open_page: Any) -> None:
 def test_what_was_understood_moves_no_field(open_page: Any, width: int) -> None:
     page = open_page(width=width, height=800)
     places = (
-        "return [...document.querySelectorAll('#fields input, .ways')]"
+        "return [...document.querySelectorAll('#fields input, .field .ways')]"
         ".map((one) => one.getBoundingClientRect().y + scrollY);"
     )
     before = page.run(places)
@@ -111,7 +111,6 @@ def test_a_deviation_stands_beside_the_number(open_page: Any, surrogate: Surroga
     assert float(page.text("#std").removeprefix(" ± ")) == close(deviation, rel=0.05)
     assert page.number() == close(answer.mu_macro, abs=10.0 ** math.floor(math.log10(deviation)))
     assert re.search("µ₀, .* k|k, .* µ₀", page.text("#advice"))
-    assert len(page.texts("#map .deviation")) == 1
     assert len(page.texts("#law .deviation")) == 1
     # one that is not small is doubted, and its origin still told
     page.type("#field-Fz", "5 ± 6 N")
@@ -253,6 +252,60 @@ def test_a_ball_whose_load_oscillates_cannot_be_chosen(open_page: Any) -> None:
     assert normal.is_enabled()
     page.click("[name=direction][value=normal]")
     assert not ball.is_enabled()
+
+
+def test_a_rigid_contact_has_no_any_motion_and_says_why(open_page: Any) -> None:
+    page = open_page("#k=rigid")
+    assert not page.find("[value=any]").is_enabled()
+    page.find("label:has(> [value=any])").click()
+    assert "limit of a large k" in page.text("#chosen")
+    page.click("[name=contact][value=spring]")
+    page.click("[name=direction][value=any]")
+    assert not page.find("[value=rigid]").is_enabled()
+    assert "limit of a large k" in page.find("label:has(> [value=rigid])").get_attribute("title")
+    # a link to both leads out again
+    page = open_page("#k=rigid&motion=any")
+    page.click("[name=contact][value=spring]")
+    assert (page.number("#motion-mu"), page.text("#motion-status")) == (0.2405, "")
+
+
+def test_all_that_k_from_materials_lacks_is_marked_at_once(open_page: Any) -> None:
+    page = open_page("#panel=stiffness")
+    page.click("#stiffness-form button")
+    marked = page.run(
+        "return [...document.querySelectorAll('#stiffness-form [aria-invalid=true]')]"
+        ".map((one) => one.id);"
+    )
+    assert marked == ["argument-radius", "argument-E", "argument-nu"]
+    page.type("#argument-radius", "5 mm")
+    page.choose("#material-1", "steel")
+    use = page.text("#stiffness-result button").strip()
+    assert use == "Use, as a ball"
+    k = page.text("#stiffness-result b")
+    page.click("#stiffness-result button")
+    assert f"k = {page.value('#field-k')}" == k  # with the digits of the list
+
+
+def test_what_an_interval_would_be_is_said_before_it_is_tried(open_page: Any) -> None:
+    page = open_page()
+    button = page.find("#as-interval")
+    assert button.text == "± 10 %"
+    assert button.get_attribute("title") == "Try k from 0.9 to 1.1 N/µm"
+    ways = page.text(".field .ways")
+    assert re.search(r"materials\s+·\s+points\s+·\s+loop \(guide\)", ways)
+    page.type("#field-k", "1 N/um ± 30 %")
+    assert button.get_attribute("title") == "Try k from 0.7 to 1.3 N/µm"
+
+
+def test_the_case_is_written_alike_in_its_field_and_below_the_law(open_page: Any) -> None:
+    page = open_page(width=1280, height=800)
+    page.type("#field-v0", "20 m/s")
+    page.type("#field-v0", "20340 mm/s")  # where the axis is in m/s
+    assert "v₀ [m/s]" in page.texts("#law .title")
+    page.press("#field-v0", "ARROW_UP")
+    speed = page.value("#field-v0")
+    assert speed == "21360 mm/s"
+    assert page.text("#law-read").startswith(f"Your case: v₀ = {speed}, ")
 
 
 # --- the history ----------------------------------------------------------------------------------
@@ -479,14 +532,14 @@ def test_a_swipe_that_starts_on_a_label_scrolls_and_changes_nothing(
 def test_arrow_keys_in_a_field_go_on_from_each_other(open_page: Any) -> None:
     page = open_page()
     page.press("#field-y0", *["ARROW_UP"] * 3)
-    assert page.value("#field-y0") == "2.31525 µm"
+    assert page.value("#field-y0") == "2.315 µm"
     page.press("#field-y0", "SHIFT", "ARROW_DOWN")
-    assert page.value("#field-y0") == "2.30373 µm"
+    assert page.value("#field-y0") == "2.304 µm"
     page.type("#field-y0", "7", commit=False)
     page.press("#field-y0", "ARROW_UP")  # not while a text is typed
     assert page.value("#field-y0") == "7"
     page.press("#field-y0", "ESCAPE")
-    assert page.value("#field-y0") == "2.30373 µm"
+    assert page.value("#field-y0") == "2.304 µm"
 
 
 def test_a_number_without_a_unit_takes_that_of_its_field(open_page: Any) -> None:
@@ -584,6 +637,43 @@ def test_every_copy_of_a_case_gives_the_number_of_the_page(
     assert float(re.findall(rf'"{path}":([^,\s]+)', curl)[0]) == close(number, rel=1e-8)
     link = open_page("#" + copied("link").partition("#")[2])
     assert link.text("#mu") == page_text
+
+
+def test_what_is_copied_breaks_after_commas_and_holds_what_was_typed(open_page: Any) -> None:
+    page = open_page("#motion=any&k=0.5 .. 2 N/um")
+    for name in ("python", "curl"):
+        page.click(f"[data-copy={name}]")
+        text = page.value("#copy-text")
+        assert "1 N/µm" in text
+        assert not re.search(r"\d{7}", text.partition(" -d ")[2] if name == "curl" else text)
+        lines = text.split("\n")
+        assert len(lines) > 3
+        assert all(one.count('"') % 2 == 0 for one in lines), name  # no string is broken
+        assert all(one.endswith(",") for one in lines[2 if name == "python" else 1 : -1])
+    rows = page.run(
+        "const field = document.querySelector('#copy-text');"
+        "return field.clientHeight / parseFloat(getComputedStyle(field).lineHeight);"
+    )
+    assert rows <= len(page.value("#copy-text").split("\n")) + 3  # with its first line in two
+
+
+def test_what_is_said_of_a_copy_goes_and_moves_nothing(open_page: Any) -> None:
+    for width in (320, 1280):
+        page = open_page(width=width, height=800)
+        place = "return ['#print', '#copy-row'].map((one) => document.querySelector(one)" + (
+            ".getBoundingClientRect().toJSON());"
+        )
+        page.run(
+            "Object.defineProperty(navigator, 'clipboard', { configurable: true,"
+            " value: { writeText: async () => { if (!window.allowed) throw new Error(); } } });"
+        )
+        before = page.run(place)
+        for allowed, words in (("false", "Now copy it."), ("true", "Copied.")):
+            page.run(f"window.allowed = {allowed};")
+            page.click("[data-copy=command]")
+            page.wait_for("#copy-status", words)
+            assert page.run(place) == before, (width, words)
+        page.wait_for("#copy-status", "^$")
 
 
 MOTIONS = [
@@ -785,6 +875,67 @@ def test_a_phone_shows_the_number_wherever_the_page_is(open_page: Any) -> None:
     assert not open_page(width=1280, height=800).find("#now").is_displayed()
 
 
+def test_the_service_gone_has_one_colour_and_no_number_on_a_phone(open_page: Any) -> None:
+    with open_page.faked(
+        "(...all) => (window.gone ? Promise.reject(new TypeError()) : real(...all))"
+    ) as page:
+        page.click("#tab-target")
+        page.run("window.gone = true;")
+        page.run(
+            "for (const [id, text] of [['field-y0', '3 um'], ['target', '0.4']]) {"
+            "const field = document.getElementById(id); field.value = text;"
+            "field.dispatchEvent(new Event('change', { bubbles: true })); }"
+        )
+        page.wait_for("#status", "^No answer from the service")
+        assert page.texts("#main .bad") == []
+        assert page.text("#short") == "µ = –, no answer"
+        page.run("window.gone = false; dispatchEvent(new Event('online'));")
+        page.settle()
+        assert page.text("#short").startswith("µ = 0.1")
+        page.run("window.gone = true;")
+        page.run(
+            "const field = document.getElementById('target'); field.value = '0.3';"
+            "field.dispatchEvent(new Event('change', { bubbles: true }));"
+        )
+        page.wait_for("#solve-status", "^No answer from the service")
+        assert page.texts("#main .bad") == []
+
+
+@pytest.mark.parametrize("width", [320, 375])
+def test_a_phone_has_room_for_labels_links_and_the_map(open_page: Any, width: int) -> None:
+    for address in ("", "#motion=any&x=2 um @ 90 deg&normal=5 N @ -90 deg"):
+        page = open_page(address, width=width, height=700)
+        heights = page.run(
+            "return [...document.querySelectorAll('#inputs .field .label')].map((one) =>"
+            " { const range = document.createRange(); range.selectNodeContents(one);"
+            " return new Set([...range.getClientRects()].map((box) => Math.round(box.y / 8)))"
+            ".size; });"
+        )
+        assert max(heights) <= 2
+        cut = page.run(
+            "return [...document.querySelectorAll('#inputs .field label')].filter((one) =>"
+            " one.scrollWidth > one.clientWidth).map((one) => one.textContent);"
+        )
+        assert cut == []
+        words = page.texts("#jump button:not([hidden])")
+        assert (words[0], words[-1]) == ("Inputs", "Copy")
+        assert len({one["y"] for one in page.rects("#jump button:not([hidden])")}) == 1
+    page = open_page(width=width, height=700)
+    assert "y₀ [µm]" not in page.texts("#map .title")
+    frame, plot = page.rects("#map rect.shade")[0], page.rects("#map")[0]
+    assert frame["width"] > 0.7 * plot["width"]
+    assert 4 <= len(page.texts("#map .tag:not(.covered)")) <= 6
+
+
+def test_keys_reach_the_map_at_once(open_page: Any) -> None:
+    page = open_page()
+    page.find("body").send_keys("")
+    page.run("document.querySelector('#skip').focus();")
+    page.press("#skip", "ENTER")
+    assert page.run("return document.activeElement.id;") == "map"
+    assert not open_page("#k=rigid").find("#skip").is_displayed()
+
+
 @pytest.mark.parametrize("width", [768, 900, 1024, 1280, 1440, 1920])
 def test_no_message_moves_the_cards_beside_it(open_page: Any, width: int) -> None:
     page = open_page(width=width, height=800)
@@ -812,7 +963,7 @@ def test_the_inputs_fill_their_card(open_page: Any, width: int, height: int, add
     page = open_page(address, width=width, height=height)
     card, last = (page.find(one).rect for one in ("#inputs", "#fields .field:last-child"))
     assert card["y"] + card["height"] - last["y"] - last["height"] <= 14
-    ends = [page.find(one).rect for one in ("#copy", "#map-section", "#side")]
+    ends = [page.find(one).rect for one in ("#map-section", "#side")]
     feet = [one["y"] + one["height"] for one in ends]
     assert max(feet) - min(feet) <= 1
 

@@ -53,7 +53,7 @@ export function cards(store, moved, aim, again) {
     if (state.motion === "any") motion(answer, answer?.state === state || trouble !== null);
     else {
       law(state, answer, target, old);
-      side(answer);
+      side(answer, old);
       copy(textsOf(state), !trouble);
     }
     if (store.dragged) return;

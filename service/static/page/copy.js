@@ -6,18 +6,26 @@ import { PARTS, caseOf, motionOf, toAddress } from "./state.js";
 
 /** What is copied, with the word on its button. */
 const BUTTONS = { link: "Link", curl: "curl", python: "Python", command: "Command" };
+const SAID_MS = 4000;
 const USUAL = { contact: "spring", direction: "across" };
 const asText = (value) => JSON.stringify(value);
 const packed = (value) => String(value).replaceAll(/\s/g, "");
 const page = () => location.origin + location.pathname;
 
-const curl = (path, body) =>
-  `curl -s ${page()}${path} -H "Content-Type: application/json" ` +
-  `-d '${asText(body).replaceAll("'", "\\u0027")}'`;
-const keywords = (body) =>
-  Object.entries(body)
-    .map(([name, value]) => `${name}=${asText(value)}`)
-    .join(", ");
+/** Members, two of them on a line, which ends at a comma. */
+function inLines(members, comma, start) {
+  const line = (i) => start + members.slice(i, i + 2).join(comma);
+  return members.flatMap((_, i) => (i % 2 ? [] : [line(i)])).join(",");
+}
+const curl = (path, body) => {
+  const members = Object.entries(body).map(([name, value]) => `${asText(name)}:${asText(value)}`);
+  const text = `{${inLines(members, ",", "\n")}}`.replaceAll("'", "\\u0027");
+  return `curl -s ${page()}${path} -H Content-Type:application/json -d '${text}'`;
+};
+const keywords = (body) => {
+  const members = Object.entries(body).map(([name, value]) => `${name}=${asText(value)}`);
+  return inLines(members, ", ", "\n    ");
+};
 /** The inputs of a command, and its options. */
 const words = (inputs) =>
   `"${Object.entries(inputs)
@@ -82,6 +90,13 @@ export function copies() {
     render(Object.entries(BUTTONS).map(button), $("copy-row"));
     field.value = texts[name];
   }
+  let said;
+  /** Says what was done, for some seconds. */
+  function say(words) {
+    write("copy-status", words);
+    clearTimeout(said);
+    said = setTimeout(() => write("copy-status", ""), SAID_MS);
+  }
   $("copy-row").addEventListener("click", async ({ target }) => {
     const name = target.closest("[data-copy]")?.dataset.copy;
     if (!name) return;
@@ -89,11 +104,11 @@ export function copies() {
     draw();
     try {
       await navigator.clipboard.writeText(texts[name]);
-      write("copy-status", "Copied.");
+      say("Copied.");
     } catch {
       // without https a browser may refuse: the text is there to be copied by hand
       field.select();
-      write("copy-status", "Select and copy it.");
+      say("Now copy it.");
     }
   });
   return (latest, answered) => {

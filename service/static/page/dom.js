@@ -7,6 +7,12 @@ export function write(id, text) {
   if ($(id).textContent !== text) $(id).textContent = text;
 }
 
+/** Gives an element a reason why there is no newer answer; one that mends itself is calm. */
+export function tell(id, reason, calm = false) {
+  write(id, reason ?? "");
+  $(id).classList.toggle("bad", Boolean(reason) && !calm);
+}
+
 /** Gives an element an attribute, where it has another value. */
 export function attribute(id, name, value) {
   if ($(id).getAttribute(name) !== value) $(id).setAttribute(name, value);

@@ -2,7 +2,7 @@
 // the fit with its residuals.
 import { Channel } from "./ask.js";
 import d3 from "./d3.js";
-import { $, write } from "./dom.js";
+import { $, tell, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { Plot, circleAt } from "./plot.js";
 import { post } from "./service.js";
@@ -49,10 +49,7 @@ export function fitPanel(store, moved, openCase) {
   };
   /** A reason in the words of the service: it names columns as they are typed, and not what has
    * the points, which is seen. */
-  const say = (text, bad = false) => {
-    write("fit-status", (text ?? "").replace(/^points(_base64)?: /, ""));
-    $("fit-status").classList.toggle("bad", bad);
-  };
+  const say = (text, calm) => tell("fit-status", text?.replace(/^points(_base64)?: /, ""), calm);
 
   /** What is asked: the case above without what the table has and what is unknown. */
   function question(more = {}) {
@@ -77,12 +74,12 @@ export function fitPanel(store, moved, openCase) {
       draw();
       fitIfAsked();
     },
-    (reason) => {
-      if (reason) {
+    (reason, calm) => {
+      if (reason && !calm) {
         table = fit = undefined;
         draw();
       }
-      say(reason, true);
+      say(reason, calm);
     },
   );
   const fits = new Channel(
@@ -92,7 +89,7 @@ export function fitPanel(store, moved, openCase) {
       say("");
       draw();
     },
-    (reason) => say(reason, true),
+    say,
   );
   /** Fits the points of the example when they are read, and its case is answered. */
   function fitIfAsked() {
@@ -229,10 +226,7 @@ export function fitPanel(store, moved, openCase) {
     $("fit-button").disabled = !table;
     $("fit-hint").hidden = Boolean(table);
     $("fit-caption").hidden = !fit;
-    write(
-      "fit-legend",
-      table?.columns.std ? "Bars: ± one standard deviation of a point." : "",
-    );
+    write("fit-legend", table?.columns.std ? "Bars: ± one standard deviation of a point." : "");
     render(result(), $("fit-lines"));
     const old = fit && JSON.stringify(question()) !== JSON.stringify(fit.question);
     $("fit-lines").classList.toggle("old", Boolean(old));
@@ -290,7 +284,10 @@ export function fitPanel(store, moved, openCase) {
     const measuredAt = (i, mu, scale, layer) => {
       if (std[i]) {
         const [from, to] = [mu - std[i], mu + std[i]].map(scale);
-        layer.append("path").attr("class", "measured").attr("d", `M${plot.x(x[i])} ${from}V${to}`);
+        layer
+          .append("path")
+          .attr("class", "measured")
+          .attr("d", `M${plot.x(x[i])} ${from}V${to}`);
       }
       dot(i, scale(mu), layer);
     };

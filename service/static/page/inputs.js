@@ -11,6 +11,7 @@ import {
   inUnit,
   numberOf,
   pageOf,
+  percent,
   prose,
   show,
   unitAt,
@@ -81,17 +82,18 @@ export function inputsPanel(store, moved) {
     const text = rigid ? "rigid" : store.state[name];
     const below = name === typing ? "" : prose(fault ?? doubt ?? "");
     const read = understood(name, text, answer?.inputs[name], store.dragged);
+    const said = name === typing ? "Enter takes it" : read || note;
     const movable = numberOf(answer?.inputs[name]) > 0 && !rigid;
     return html`
       <div class="field ${name === typing ? "" : fault ? "bad" : doubt ? "doubt" : ""}">
         <label
           for=${`field-${name}`}
           data-dial=${movable ? name : nothing}
-          title=${`${meaning}${movable ? `. ${HOW}` : ""}`}
+          title=${`${[meaning, note].filter(Boolean).join(", ")}${movable ? `. ${HOW}` : ""}`}
         >
           <span class="symbol">${symbol}</span>
           <span class="label"
-            >${label}<small>${name === typing ? "Enter takes it" : read || note}</small></span
+            >${label}<small class=${said === note ? "usual" : ""}>${said}</small></span
           >
         </label>
         <input
@@ -112,6 +114,8 @@ export function inputsPanel(store, moved) {
 
   /** Where k comes from, which is the input that nobody knows. */
   function ways({ value: k, std, high } = {}) {
+    const free = k > 0 && high === undefined; // of an interval
+    const range = free ? around(k, std ? std / k : undefined) : "";
     const tool = (panel, words, title) => html`
       <button
         title=${title}
@@ -128,17 +132,19 @@ export function inputsPanel(store, moved) {
       <button
         id="as-interval"
         type="button"
-        title="From k less its deviation, or 10 %, to k more that, to be changed"
-        ?disabled=${!(k > 0) || high !== undefined}
-        @click=${() => store.change({ k: around(k, std ? std / k : undefined) })}
+        title=${free ? `Try k from ${range.replace("..", " to ")}` : "k is an interval"}
+        ?disabled=${!free}
+        @click=${() => store.change({ k: range })}
       >
-        interval
+        ± ${std ? percent(std / k) : "10 %"}
       </button>
     `;
     return html`<p class="ways">
-      Find k: ${tool("stiffness", "materials", "k from materials")}
-      ${tool("fit", "points", "k from measured points of friction")}
-      <a title="k from a measured loop" href=${pageOf("how-to/loop")}>loop</a>
+      Find k: ${tool("stiffness", "materials", "k from materials")} ·
+      ${tool("fit", "points", "k from measured points of friction")} ·
+      <a title="k from a measured loop" href=${pageOf("how-to/loop")}
+        >loop<span class="aside">&nbsp;(guide)</span></a
+      >
       ${interval}
     </p>`;
   }
@@ -154,7 +160,7 @@ export function inputsPanel(store, moved) {
     if (!(from > 0)) return;
     event.preventDefault();
     const value = from * (event.shiftKey ? FINE_STEP : STEP) ** way;
-    moved({ [name]: value }, 6);
+    moved({ [name]: value });
     stepped = { name, value, text: store.state[name] };
   }
 
@@ -221,14 +227,14 @@ export function inputsPanel(store, moved) {
 
   return (reply, faults) => {
     [answer, known] = [reply, faults];
-    const { contact, direction } = store.state;
+    const { contact } = store.state;
     const take = (way) =>
       store.change(way === "any" ? anyMotion() : { motion: "one", direction: way });
     const without = (kind) => about.impossible[kind];
     const reasons = (names, kind) =>
       Object.fromEntries(names.map((name) => [name, without(kind(name))]).filter(([, why]) => why));
-    const ball = reasons(["spring", "ball", "rigid"], (name) => `${name} ${direction}`);
-    const ways = reasons(["across", "along", "normal"], (name) => `${contact} ${name}`);
+    const ball = reasons(["spring", "ball", "rigid"], (name) => `${name} ${oscillation()}`);
+    const ways = reasons(["across", "along", "normal", "any"], (name) => `${contact} ${name}`);
     render(
       [
         choice("contact", about.contacts, contact, (one) => store.change({ contact: one }), ball),

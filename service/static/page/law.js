@@ -1,7 +1,7 @@
 // The friction law: µ over one input.
 import { Channel } from "./ask.js";
 import d3 from "./d3.js";
-import { $, attribute, write } from "./dom.js";
+import { $, attribute, tell, write } from "./dom.js";
 import { endsOf, inLine, peakOf } from "./number.js";
 import { Plot, save } from "./plot.js";
 import { post } from "./service.js";
@@ -16,6 +16,7 @@ import {
   show,
   toSI,
   toUnit,
+  unitAt,
   unitOver,
   whole,
 } from "./words.js";
@@ -23,7 +24,8 @@ import {
 const { area, bisectCenter } = d3;
 
 const POINTS = 241;
-const HALF_NAME = 30; // pixels about the name of a line
+const NEAR = 8; // pixels between two marks that are one
+const LINE = 16; // pixels of a line of text
 const FAR = 0.25; // of the axis of µ: what is drawn above that has an axis that does not begin at 0
 const FLAT = 0.03; // of µ: what varies less is drawn over an axis from 0
 const EXTREMES = [1e-300, 1e300]; // of a range
@@ -77,6 +79,7 @@ export function lawPanel(store, moved) {
   let answer, law, target, latest;
   let pointer = null; // where it is in the plot
   let refused = null;
+  let waits = false; // where the reason mends itself
   let behind = false; // whether the number belongs to earlier values
   const plot = new Plot($("law"), paint, mark);
   const along = () => law?.along ?? store.state.along;
@@ -95,15 +98,14 @@ export function lawPanel(store, moved) {
       describe();
     },
     (reason, calm) => {
-      refused = reason;
-      $("law-status").classList.toggle("bad", reason !== null && !calm);
-      tell();
+      [refused, waits] = [reason, calm];
+      explain();
     },
   );
 
   /** Why there is no other law; what the number lacks, too, is told beside the number. */
-  function tell() {
-    write("law-status", behind ? "" : (refused ?? ""));
+  function explain() {
+    tell("law-status", behind ? "" : refused, waits);
     $("law").classList.toggle("old", behind || refused !== null);
   }
 
@@ -150,56 +152,88 @@ export function lawPanel(store, moved) {
       lines: true,
     });
     if (foot > 0) plot.cut();
-    const { inside, box } = plot;
-    plot.path(
-      places.map((x, i) => [x, law.mu_static[i]]),
-      "still",
-    );
-    const ends = band();
-    if (ends) range(places, ...ends, "band");
+    const still = places.map((x, i) => [x, law.mu_static[i]]);
     // at a border the curve may be steep
     const steep = law.border.map(({ value, mu_macro: mu }) => [
       toUnit(law.along, value, unit()),
       mu,
     ]);
-    plot.path(
-      [...places.map((x, i) => [x, law.mu_macro[i]]), ...steep].sort(([a], [b]) => a - b),
-      "curve",
-    );
-    for (const { value } of law.border) {
-      const x = plot.x(toUnit(law.along, value, unit()));
-      inside.append("path").attr("class", "border").attr("d", `M${x} ${box.y}v${box.height}`);
-      const left = x - box.x > box.width / 2;
-      // at the end of the line that is farther from the curve
-      const at = bisectCenter(law.values, value);
-      const above = plot.y(law.mu_macro[at]) > box.y + box.height / 2;
-      plot.text(
-        law.along === "v0" ? "critical speed" : "border",
-        x + (left ? -5 : 5),
-        above ? box.y + 12 : box.y + box.height - 6,
-        "mark",
-        left ? "end" : "start",
-      );
-    }
+    const curve = [...places.map((x, i) => [x, law.mu_macro[i]]), ...steep];
+    curve.sort(([a], [b]) => a - b);
+    plot.path(still, "still");
+    const ends = band();
+    if (ends) range(places, ...ends, "band");
+    plot.path(curve, "curve");
+    for (const line of [curve, still]) plot.avoid(line);
+    for (const one of law.border) border(one);
+    peak();
     nameStatic(places);
   }
 
-  /** Names the dotted line where it is about as far from the curve as anywhere, to the right, and
-   * clear of a border. */
-  function nameStatic(places) {
+  const at = (value) => plot.x(toUnit(law.along, value, unit()));
+  /** Places of a name beside an upright line, at its ends first; to the right first, or not. */
+  function beside(x, toRight) {
     const { box } = plot;
-    const away = law.mu_static.map((mu, i) => Math.abs(plot.y(mu) - plot.y(law.mu_macro[i])));
-    const lines = law.border.map(({ value }) => plot.x(toUnit(law.along, value, unit())));
-    const edges = [box.x, box.x + box.width, ...lines];
-    const inner = away.map((far, i) =>
-      edges.every((edge) => Math.abs(plot.x(places[i]) - edge) > HALF_NAME) ? far : -1,
+    const rows = Array.from(
+      { length: Math.max(Math.floor(box.height / LINE), 1) },
+      (_, i) => box.y + 12 + LINE * i,
     );
-    const i = inner.findLastIndex((far) => far >= Math.max(0, 0.9 * Math.max(...inner)));
-    if (i < 0) return;
-    const [x, y] = [plot.x(places[i]), plot.y(law.mu_static[i])];
+    const end = (y) => Math.min(y - box.y, box.y + box.height - y);
+    const ends = rows.toSorted((a, b) => end(a) - end(b));
+    const side = (right) =>
+      ends.map((y) => ({ x: x + (right ? 4 : -4), y, anchor: right ? "start" : "end" }));
+    return [...side(toRight), ...side(!toRight)];
+  }
+
+  /** The line of a border, with the regime that begins at it. */
+  function border({ value }) {
+    const { inside, box } = plot;
+    const x = at(value);
+    inside.append("path").attr("class", "border").attr("d", `M${x} ${box.y}v${box.height}`);
+    plot.lines.push([x - 1, box.y, x + 1, box.y + box.height]);
+    const i = law.values.findIndex((one) => one > value);
+    const [below, above] = [law.regime.at(i - 1), law.regime.at(i)];
+    const right =
+      ["continuous", "reverse_slip"].find((one) => one === below || one === above) === above;
+    const arrow = (words) => (right ? `${words} →` : `← ${words}`);
+    const slides = [below, above].includes("continuous");
+    const words = slides ? "sliding all the time" : inWords("reverse_slip");
+    const texts =
+      law.along === "v0" && slides
+        ? [`critical speed${isPeak(x) ? " = y₀ω" : ""}`, "critical speed"]
+        : [arrow(`${words} from here`), arrow(words), arrow(words.replace(/ (?=\S+ \S+$)/, "\n"))];
+    plot.label(texts, beside(x, right), "mark");
+  }
+
+  /** Whether the largest speed of the oscillation is at a place of the axis. */
+  const isPeak = (x) => Math.abs(at(peakOf(answer.inputs)) - x) < NEAR;
+
+  /** The largest speed of the oscillation on the axis of v₀, where it is no border. */
+  function peak() {
+    const speed = law.along === "v0" && peakOf(answer.inputs);
+    const { box } = plot;
+    if (!(speed > law.values[0] && speed < law.values.at(-1))) return;
+    const x = at(speed);
+    if (law.border.some(({ value }) => isPeak(at(value)))) return;
     const foot = box.y + box.height;
-    const below = law.mu_static[i] <= law.mu_macro[i] ? y + 14 < foot : y - 14 < box.y;
-    plot.text("static µ", x, below ? y + 14 : y - 6, "note");
+    plot.over.append("path").attr("class", "rule").attr("d", `M${x} ${foot}v-9`);
+    plot.label(
+      ["y₀ω"],
+      beside(x, true).filter(({ y }) => y > foot - 2 * LINE),
+      "note",
+    );
+  }
+
+  /** Names the dotted line, to the right and beyond the curve where there is room. */
+  function nameStatic(places) {
+    const spots = places.map((one, i) => {
+      const [x, y] = [plot.x(one), plot.y(law.mu_static[i])];
+      const below = { x, y: y + 13, anchor: "middle" };
+      const above = { x, y: y - 5, anchor: "middle" };
+      const higher = { ...above, y: y - 9 };
+      return law.mu_static[i] > law.mu_macro[i] ? [above, higher, below] : [below, above, higher];
+    });
+    plot.label(["static µ"], spots.reverse().flat(), "note");
   }
 
   /** The line of the target and the user's point. */
@@ -221,6 +255,17 @@ export function lawPanel(store, moved) {
       plot.bar(...[low, high].map((end) => [toUnit(law.along, end, unit()), answer.mu_macro]));
     else if (ends) plot.bar(...ends.map((end) => [x, end]));
     plot.point(x, answer.mu_macro);
+    nameTarget();
+  }
+
+  function nameTarget() {
+    if (target?.along !== law.along) return;
+    const { box } = plot;
+    const y = plot.y(target.mu_macro);
+    const right = box.x + box.width - 4;
+    const spots = Array.from({ length: 8 }, (_, i) => right - (i / 8) * box.width);
+    const at = (x) => [y - 5, y + 13].map((one) => ({ x, y: one, anchor: "end" }));
+    plot.label([`target ${show(target.mu_macro)}`], spots.flatMap(at), "note target-number");
   }
 
   const range = (places, low, high, className) =>
@@ -235,12 +280,15 @@ export function lawPanel(store, moved) {
           .y1((_, i) => plot.y(high[i]))(places),
       );
 
-  /** The value of the case on the axis, or both ends of its interval; empty where it has none. */
+  /** The value of the case as its field has it, or both ends of its interval; empty where it has
+   * none. */
   function here() {
-    const { low, high } = answer?.inputs[law.along] ?? {};
-    if (high > low) return `${text(low)} to ${inUnit(law.along, high, unit())}`;
+    const { low, high, unit: typed } = answer?.inputs[law.along] ?? {};
+    const { symbol } = about.inputs[law.along];
+    const said = (value) => inUnit(law.along, value, unitAt(law.along, value, typed));
+    if (high > low) return `${symbol} = ${said(low)} to ${said(high)}`;
     const value = numberOf(answer?.inputs[law.along]);
-    return value === undefined ? "" : text(value);
+    return value === undefined ? "" : `${symbol} = ${said(value)}`;
   }
 
   /** What stands below the law: at the pointer, else at the user's point. */
@@ -264,7 +312,7 @@ export function lawPanel(store, moved) {
       const value = numberOf(answer?.inputs[along()]);
       if (!right || value === undefined) return false;
       read(null); // the point has moved, and the pointer has not
-      moved({ [along()]: value * factor ** right }, 6);
+      moved({ [along()]: value * factor ** right });
       return true;
     },
   });
@@ -313,7 +361,7 @@ export function lawPanel(store, moved) {
     [answer, target] = [reply, wanted];
     behind = old;
     const drawn = old ? { ...state, ...inputsAlone(reply.state) } : state;
-    tell();
+    explain();
     for (const id of ["csv", "law-image"]) $(id).disabled = !law;
     if (!answer) return;
     const below = [unit(), answer.inputs.mu0.value, own(), state.axis].join();

@@ -33,7 +33,6 @@ const point = new Channel(
   (reply, state) => {
     answer = { ...reply, state };
     trouble = null;
-    target = null;
     show();
   },
   (reason, calm, reply) => {
@@ -157,6 +156,7 @@ addEventListener(
 $("jump").addEventListener("click", ({ target }) =>
   $(target.closest("[data-to]")?.dataset.to)?.scrollIntoView(),
 );
+$("skip").addEventListener("click", () => $("map").focus());
 $("print").addEventListener("click", () => window.print());
 new Channel(
   () => getPreloaded("static/page/names.json"),

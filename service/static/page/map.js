@@ -11,8 +11,10 @@ import { about, inPrint, inUnit, inWords, show, toUnit, unitAt, whole } from "./
 const { contours } = d3;
 
 const DIGITS = 27; // pixels of a number of the legend
+const DIGIT = 7; // pixels of a figure beside the line of a target
 const NEAR = 7; // pixels from the user's point, within which its own number is read
-const SIDES = 118; // pixels beside the map, with the numbers of its axes
+const SLIM = 400; // pixels of a map, below which it has no axis to the right
+const KEY = 340; // pixels of a frame, from which its key stands beside the title of its axis
 
 /** The relative deviation of an input; 0 where it has none. */
 const deviationOf = (one) => (one?.std ? one.std / one.value : 0);
@@ -77,8 +79,9 @@ export function mapPanel(store, moved, loaded) {
         title: normal ? "amplitude ỹ = ΔFz/Fz" : "amplitude ỹ = y₀/l₀",
       },
       top: ownSizes() ? 40 : 12,
-      right: ownSizes() ? 62 : 24,
-      below: 19 + 11 * numberLines(),
+      right: rightSide(),
+      below: 19 + 11 * numberLines() + (isKeyBelow() ? 15 : 0),
+      slim: isSlim(),
     });
     const { box, inside, over } = plot;
     const ground = inside.append("rect").attr("class", "shade").style("fill", map.colours[0]);
@@ -96,9 +99,11 @@ export function mapPanel(store, moved, loaded) {
     // a number gives way to the name of a regime
     for (const [u, w, words] of map.areas)
       plot.area(words, ...at(u, w), `area${ratioAt(u, w) < PALE ? " deep" : ""}`);
-    for (const [level, u, w] of map.labels)
+    const some = map.labels.filter((_, i) => !isSlim() || i % 2 === 0);
+    for (const [level, u, w] of some)
       plot.text(show(level), ...at(u, w), "tag").attr("dy", "0.35em");
     legend(over);
+    key(over);
   }
 
   /** µ/µ₀ at a place of the frame, from 0 to 1 to the right and up: bilinear in the grid. */
@@ -133,11 +138,13 @@ export function mapPanel(store, moved, loaded) {
   function numbered({ coordinates }) {
     const { box } = plot;
     const places = coordinates.flat(2).map(onPlot);
-    const [right, foot] = [box.x + 0.9 * box.width, box.y + box.height - 9];
+    const words = show(target);
+    const right = box.x + box.width - 14 - DIGIT * words.length;
+    const foot = box.y + box.height - 9;
     const [x, y] = places
       .filter(([x, y]) => x < right && y > box.y + 20 && y < foot)
       .reduce((best, one) => (one[0] > best[0] ? one : best), [-Infinity, 0]);
-    if (x > box.x) plot.text(show(target), x + 8, y + 4, "tag target-number", "start");
+    if (x > box.x) plot.text(words, x + 8, y + 4, "tag target-number", "start");
   }
 
   /** Where a case is on the map, null where it has no place. Without oscillation the service has no
@@ -172,11 +179,36 @@ export function mapPanel(store, moved, loaded) {
       return { domain, log, title: `${about.inputs[name].symbol} [${inPrint(unit)}]` };
     };
     const up = inputsOf(one.state)[3];
-    plot.outerAxes({ x: axis("v0", map.v_tilde), y: axis(up, map.y_tilde) });
+    plot.outerAxes({ x: axis("v0", map.v_tilde), y: isSlim() ? null : axis(up, map.y_tilde) });
   }
 
+  const isSlim = () => plot.width < SLIM;
+  const rightSide = () => (ownSizes() && !isSlim() ? 62 : 24);
+  /** Pixels of the frame, about. */
+  const frame = () => plot.width - rightSide() - (isSlim() ? 48 : 56);
+  const isKeyBelow = () => frame() < KEY;
   /** Lines for the numbers of the legend. */
-  const numberLines = () => (plot.width - SIDES < DIGITS * map.colours.length ? 2 : 1);
+  const numberLines = () => (frame() < DIGITS * map.colours.length ? 2 : 1);
+
+  /** What the lines mean, beside the title of the axis or below it. */
+  function key(over) {
+    const { box } = plot;
+    const y = box.y + box.height + (isKeyBelow() ? 49 : 34);
+    const sign = (className, left, words) => {
+      const group = over.append("g").attr("class", "key");
+      group
+        .append("path")
+        .attr("class", className)
+        .attr("d", `M${left} ${y - 4}h22`);
+      group
+        .append("text")
+        .attr("x", left + 27)
+        .attr("y", y)
+        .text(words);
+    };
+    sign("border", box.x, "critical speed");
+    if (map.reverse.length) sign("border reverse", box.x + box.width - 90, "reverse slip");
+  }
 
   /** The colours and the levels between them, below the map; where they are narrow, every second
    * number is a line lower. */
@@ -200,9 +232,7 @@ export function mapPanel(store, moved, loaded) {
 
   const powers = () => [SPEED, AMPLITUDE[amplitude()]];
   const deviations = (inputs) =>
-    powers().map((one) =>
-      Math.hypot(...Object.keys(one).map((name) => deviationOf(inputs[name]))),
-    );
+    powers().map((one) => Math.hypot(...Object.keys(one).map((name) => deviationOf(inputs[name]))));
 
   /** How far the deviation of each input moves a place of the map, in pixels; k, µ₀ and Fz move it
    * along both axes at once. */
@@ -228,16 +258,12 @@ export function mapPanel(store, moved, loaded) {
     plot.point(along, up);
   }
 
-  function outside() {
-    if (!answer?.groups || !map) return "";
-    const { v, y } = placeOf(answer);
-    const beyond = (value, { start, stop }) => value < start || value > stop;
-    const names = [
-      beyond(v, map.v_tilde) && `ṽ = ${show(v, 3)}`,
-      beyond(y, map.y_tilde) && `ỹ = ${show(y, 3)}`,
-    ].filter(Boolean);
-    return names.length ? `Outside of this map: ${names.join(", ")}.` : "";
-  }
+  /** Whether a place is outside of the map. */
+  const isOutside = ({ v, y }) =>
+    [
+      [v, map.v_tilde],
+      [y, map.y_tilde],
+    ].some(([value, { start, stop }]) => value < start || value > stop);
 
   /** The user's point in words, with its deviation or over the interval of k. */
   function yourCase() {
@@ -251,7 +277,9 @@ export function mapPanel(store, moved, loaded) {
     };
     const mu =
       high > low || answer.std ? `µ = ${inLine(answer)}` : `µ/µ₀ = ${show(answer.mu_ratio)}`;
-    return `Your case: ṽ = ${said(v, dv, true)}, ỹ = ${said(y, dy, map.y_tilde.log)}, ${mu}`;
+    const where = isOutside({ v, y }) ? ", outside of this map" : "";
+    const place = `ṽ = ${said(v, dv, true)}, ỹ = ${said(y, dy, map.y_tilde.log)}`;
+    return `Your case${where}: ${place}, ${mu}`;
   }
 
   /** Whether a place of the plot is on the user's point, which a drag takes along. */
@@ -266,9 +294,10 @@ export function mapPanel(store, moved, loaded) {
     pointer = place;
     if (!map) return;
     const at = place && plot.holds(place) && !onPoint(place) ? place : null;
+    plot.cross(store.dragged ? null : at);
     if (!at) {
       const line = lined() ? `Dash-dotted line: µ/µ₀ = ${show(target)}.` : "";
-      const said = outside() || (placeOf(answer) ? yourCase() : "");
+      const said = placeOf(answer) ? yourCase() : "";
       write("map-read", whole(line ? `${said.replace(/[^.]$/, "$&.")} ${line}` : said));
       return;
     }
@@ -307,7 +336,6 @@ export function mapPanel(store, moved, loaded) {
         Object.fromEntries(
           changed.map(([name, way]) => [name, answer.inputs[name].value * factor ** way]),
         ),
-        6,
       );
       return true;
     },

@@ -3,10 +3,10 @@
 import { Channel } from "./ask.js";
 import { motionTexts } from "./copy.js";
 import d3 from "./d3.js";
-import { $, write } from "./dom.js";
+import { $, tell, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { list } from "./meanings.js";
-import { Plot } from "./plot.js";
+import { Plot, circleAt } from "./plot.js";
 import { post } from "./service.js";
 import { PARTS, inputsOf, motionOf, partsOf, startState, uncertainOf } from "./state.js";
 import {
@@ -28,7 +28,7 @@ import {
 
 const { extent } = d3;
 
-const MEANINGS = { x: "along the drag", y: "across it", normal: "of the load" };
+const MEANINGS = { x: "along", y: "across", normal: "load" };
 /** The input whose units an oscillation has. */
 const LIKE = { x: "y0", y: "y0", normal: "Fz_amplitude" };
 const UNKNOWNS = {
@@ -55,6 +55,10 @@ const plainly = (text) =>
     .replace("−", "-")
     .replace(/(deg|°)$/, "")
     .replace(/@0$/, "");
+/** The axes of the path. */
+const AXES = { x: "x − v₀t [µm]", y: "y [µm]" };
+const SLIPPING = 1 - 1e-9; // of the limit of friction, from which a spring slips
+const AHEAD = 16; // pixels from the dot of a path to its arrow
 const BEYOND = "too large to be written";
 const TAKEN = 6; // digits of a value that is taken into the form
 const LINE = 14; // pixels between two names
@@ -64,7 +68,7 @@ export function motionPanel(store, moved, copy) {
   let faults = new Map();
   let refused = null;
   let waits = false; // where the reason mends itself
-  let answer, motion, asked, latest, solved, solvedFor, targetRefused;
+  let answer, motion, asked, latest, solved, solvedFor, targetRefused, targetWaits;
   const forces = new Plot($("forces"), paintForces);
   const path = new Plot($("path"), paintPath);
 
@@ -77,6 +81,11 @@ export function motionPanel(store, moved, copy) {
   const answerTo = (body) => post("v1/motion", body);
   function take(reply, body) {
     [motion, asked] = [reply, JSON.stringify(body)];
+    const directions = shaken().length;
+    $("main").dataset.path = ["none", "line", "plane"][directions];
+    $("path-none").hidden = directions > 0;
+    const both = motion.contact === "spring" && motion.stick_fraction > 0 && directions > 0;
+    for (const hint of ["forces-hint", "path-hint"]) $(hint).hidden = !both;
     forces.redraw();
     path.redraw();
     draw();
@@ -102,8 +111,8 @@ export function motionPanel(store, moved, copy) {
       [solved, solvedFor] = [reply, JSON.stringify(body)];
       draw();
     },
-    (reason) => {
-      targetRefused = reason;
+    (reason, calm) => {
+      [targetRefused, targetWaits] = [reason, calm];
       draw();
     },
   );
@@ -245,7 +254,7 @@ export function motionPanel(store, moved, copy) {
   function withoutDeviations() {
     const body = motionOf(store.state, answer);
     const names = uncertainOf(store.state, answer, body);
-    const middle = body.k === answer?.inputs.k?.value && middleOf(answer);
+    const middle = body.k !== store.state.k && answer && middleOf(answer);
     if (middle) return whole(`Computed at ${middle}, the middle of the interval.`);
     if (!names.length) return "";
     const symbols = names.map((name) => about.inputs[name].symbol).join(", ");
@@ -257,10 +266,12 @@ export function motionPanel(store, moved, copy) {
     render(PARTS.map(field), $("motion-form"));
     if (motion) numbers();
     render(roots(), $("motion-roots"));
-    tell();
+    explain();
     document.querySelector("[data-meanings=motion-values]").disabled = !motion;
     const remarks = (motion?.remarks ?? []).filter((one) => !isDoubt(one));
-    const all = [withoutDeviations(), ...remarks.map(({ text }) => prose(text))].filter(Boolean);
+    const all = [withoutDeviations(), ...remarks.map(({ text }) => capital(prose(text)))].filter(
+      Boolean,
+    );
     render(
       all.map((words) => html`<li>${words}</li>`),
       $("motion-doubt"),
@@ -272,16 +283,17 @@ export function motionPanel(store, moved, copy) {
       part.classList.toggle("old", Boolean(old));
     const other = Boolean(solved && JSON.stringify(targetQuestion()) !== solvedFor);
     $("motion-roots").classList.toggle("old", other);
-    write(
+    const why = targetRefused && prose(targetRefused);
+    tell(
       "motion-target-status",
-      targetRefused ? prose(targetRefused) : other ? "This was asked with other values." : "",
+      why ?? (other ? "This was asked with other values." : ""),
+      !why || targetWaits,
     );
-    $("motion-target-status").classList.toggle("bad", Boolean(targetRefused));
     copy(motionTexts(state, answer), !refused);
   }
 
   /** Why there is no newer number; what is wrong with a field stands beside it. */
-  function tell() {
+  function explain() {
     const names = faulty();
     const fields = [...inputsOf(store.state), ...PARTS];
     const told = names.length > 0 && names.every((name) => fields.includes(name));
@@ -292,8 +304,7 @@ export function motionPanel(store, moved, copy) {
     };
     const whose = motion && `The number shown is that of ${names.map(shown).join(", ")}.`;
     const reason = told ? whole(`${capital(check)}. ${whose ?? ""}`) : prose(refused ?? "");
-    write("motion-status", reason);
-    $("motion-status").classList.toggle("bad", refused !== null && !waits);
+    tell("motion-status", reason, waits);
     if (refused && told) write("short", `µ = –, ${check}`);
   }
 
@@ -315,6 +326,15 @@ export function motionPanel(store, moved, copy) {
       y: { domain: padded([0, ...all]), log: false, title: "force [N]" },
       right: 30,
     });
+    for (const [from, to, sticking] of runs(cycle))
+      if (sticking)
+        forces.inside
+          .append("rect")
+          .attr("class", "sticking")
+          .attr("x", forces.x(phase[from]))
+          .attr("width", forces.x(phase[to]) - forces.x(phase[from]))
+          .attr("y", forces.box.y)
+          .attr("height", forces.box.height);
     forces.path(
       [
         [0, 0],
@@ -336,30 +356,80 @@ export function motionPanel(store, moved, copy) {
     }
   }
 
-  /** The way of the upper point without the drag, both axes alike. */
+  /** The cycle of a spring in parts [from, to, whether it sticks]; of a ball a part sticks nearly
+   * always. */
+  function runs({ share }) {
+    const last = share.length - 1;
+    if (motion.contact === "ball") return [[0, last, false]];
+    const sticks = share.map((one) => one < SLIPPING);
+    const starts = sticks.flatMap((one, i) => (i && one === sticks[i - 1] ? [] : [i]));
+    return starts.map((from, i) => [from, Math.min(starts[i + 1] ?? last, last), sticks[from]]);
+  }
+
+  /** The directions in which the body is shaken. */
+  const shaken = () =>
+    ["x", "y"].filter((name) =>
+      motion.inputs[name]?.harmonics.some(({ amplitude }) => amplitude > 0),
+    );
+
+  /** The way of the upper point without the drag [µm], along and across. */
+  function way({ t, x, y }) {
+    const drift = (x.at(-1) - x[0]) / t.at(-1);
+    return { x: x.map((one, i) => 1e6 * (one - drift * t[i])), y: y.map((one) => 1e6 * one) };
+  }
+
   function paintPath() {
     const cycle = motion?.cycle;
-    if (!cycle) return;
-    const drift = (cycle.x.at(-1) - cycle.x[0]) / cycle.t.at(-1);
-    const along = cycle.x.map((x, i) => 1e6 * (x - drift * cycle.t[i]));
-    const across = cycle.y.map((y) => 1e6 * y);
+    const names = cycle ? shaken() : [];
+    if (!names.length) {
+      path.clear();
+      return;
+    }
+    const ways = way(cycle);
+    const places = names.length > 1 ? plane(ways) : lane(ways[names[0]], AXES[names[0]]);
+    for (const [from, to, sticking] of runs(cycle))
+      path.path(places.slice(from, to + 1), `curve${sticking ? " sticks" : ""}`);
+    const seen = places.map(([x, y]) => [path.x(x), path.y(y)]);
+    path.over
+      .append("path")
+      .attr("class", "start")
+      .attr("d", circleAt(...seen[0], 5));
+    // the head of an arrow, so far behind the dot that it is beside it
+    const far = (one) => Math.hypot(one[0] - seen[0][0], one[1] - seen[0][1]);
+    const i = Math.max(
+      seen.findIndex((one) => far(one) > AHEAD),
+      1,
+    );
+    const turn = Math.atan2(seen[i][1] - seen[i - 1][1], seen[i][0] - seen[i - 1][0]);
+    path.over
+      .append("path")
+      .attr("class", "start")
+      .attr("d", "M6 0L-6 -6L-6 6Z")
+      .attr("transform", `translate(${seen[i]}) rotate(${(turn * 180) / Math.PI})`);
+  }
+
+  /** The places of a path in two directions, both axes alike. */
+  function plane({ x: along, y: across }) {
     const [length, width] = [along, across].map((one) => Math.max(...one) - Math.min(...one));
     const middle = (one) => (Math.max(...one) + Math.min(...one)) / 2;
     const ratio = Math.max(path.width - 80, 1) / Math.max(path.height - 52, 1);
-    const tall = 0.55 * Math.max(length / ratio, width, 1e-9); // the path fills the frame
-    const wide = tall * ratio;
+    const tall = 0.55 * Math.max(length / ratio, width); // the path fills the frame
+    const about = (one, half) => [middle(one) - half, middle(one) + half];
     path.axes({
-      x: {
-        domain: [middle(along) - wide, middle(along) + wide],
-        log: false,
-        title: "x − v₀t [µm]",
-      },
-      y: { domain: [middle(across) - tall, middle(across) + tall], log: false, title: "y [µm]" },
+      x: { domain: about(along, tall * ratio), log: false, title: AXES.x },
+      y: { domain: about(across, tall), log: false, title: AXES.y },
     });
-    path.path(
-      along.map((x, i) => [x, across[i]]),
-      "curve",
-    );
+    return along.map((x, i) => [x, across[i]]);
+  }
+
+  /** The places of a path in one direction: there is drawn above back. */
+  function lane(way, title) {
+    path.axes({
+      x: { domain: padded(way), log: false, title },
+      y: { domain: [-1, 1], log: false, title: "", bare: true },
+    });
+    const side = (i) => (way[i + 1] ?? way[1]) >= way[i];
+    return way.map((x, i) => [x, side(i) ? 0.5 : -0.5]);
   }
 
   $("motion-form").addEventListener("submit", (event) => event.preventDefault());

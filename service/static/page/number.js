@@ -1,7 +1,7 @@
 // The number: µ, as large as the page has it, with its deviation or its interval; what of µ₀ is
 // left, and the regime, in words; one line of advice, and what it assumes below that.
 import { Channel } from "./ask.js";
-import { $, write } from "./dom.js";
+import { $, tell, write } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { post } from "./service.js";
 import { caseAround, caseOf, inputsOf } from "./state.js";
@@ -27,7 +27,7 @@ import {
 
 const STIFFNESS = "k is known"; // row of the model
 const ALWAYS = "the contact does not stretch before it slips"; // of a rigid one, without a limit
-const SLIGHT = 0.01; // change of µ, below which k needs no advice
+const SLIGHT = 3; // change of µ in per cent for 10 % of k, below which k needs no advice
 const FEW = 4; // digits of the number
 
 const symbolOf = (name) => about.inputs[name === "omega" ? "f" : name].symbol;
@@ -62,9 +62,10 @@ export function inLine(answer) {
   return std ? `${value} ± ${std}` : value;
 }
 
-/** The number in one line of a phone, with what of µ₀ is left; or which fields to check. */
-function shortOf(answer, faults) {
-  if (faults.length) return `µ = –, check ${faults.map(called).join(", ")}`;
+/** The number in one line of a phone, with what of µ₀ is left; or why there is none. */
+function shortOf(answer, faults, old) {
+  if (old)
+    return `µ = –, ${faults.length ? `check ${faults.map(called).join(", ")}` : "no answer"}`;
   return `µ = ${inLine(answer)}, ${some(answer)}${shareOf(answer)} left`;
 }
 
@@ -112,19 +113,25 @@ export function sensitivities({ gradient, mu_macro: mu, inputs }) {
 /** The largest speed of the oscillation [m/s], undefined where the load is shaken. */
 export const peakOf = ({ y0, f }) => y0 && y0.value * 2 * Math.PI * f.value;
 
-/** The inputs that change µ most, as far as two digits tell, before what is said of k. */
-function deciding(answer, words) {
-  const size = ([, share]) => Number(Math.abs(share).toPrecision(2));
-  const shares = sensitivities(answer);
-  const most = Math.max(0, ...shares.map(size));
-  const first = shares.filter((one) => most && size(one) === most);
-  if (!first.length) return { row: "stiffness", words };
-  const names = first.map(([name]) => symbolOf(name)).join(" and ");
-  const each =
-    first.length > 1 ? `of each changes µ by ${most}` : `more changes µ by ${show(first[0][1], 2)}`;
+/**
+ * The inputs that change µ most when they are 10 % more or less, as far as two digits tell, and k
+ * beside them where it matters, which may then be given as an interval or fitted.
+ */
+function deciding(answer, effect) {
+  const change = ([name, share]) =>
+    Number((name === "k" && effect ? 100 * effect : Math.abs(10 * share)).toPrecision(2));
+  const changes = sensitivities(answer).map((one) => [one[0], change(one)]);
+  const most = Math.max(0, ...changes.map(([, size]) => size));
+  if (!most) return null;
+  const first = changes.filter(([, size]) => size === most).map(([name]) => name);
+  const [, ofK = 0] = changes.find(([name]) => name === "k") ?? [];
+  const matters = ofK >= SLIGHT;
+  const each = first.length > 1 ? "of each " : "";
+  const k = matters && !first.includes("k") ? `, of k by ${show(ofK)} %` : "";
   return {
-    row: `${names} decide${first.length > 1 ? "" : "s"} most`,
-    words: first.some(([name]) => name === "k") ? words : `1 % ${each} %. ${words}`,
+    row: `${first.map(symbolOf).join(" and ")} decide${first.length > 1 ? "" : "s"} most`,
+    words: `10 % more or less ${each}changes µ by ${show(most)} %${k}.`,
+    remedy: matters && numberOf(answer.inputs.k),
   };
 }
 
@@ -141,66 +148,55 @@ function variance({ std_share: shares }) {
   return words.length ? origin : "";
 }
 
-/** A remark in the page's signs; an interval of k is shown for this one. */
-function sentence(text, inputs) {
-  const k = numberOf(inputs?.k);
-  const example = k === undefined ? "" : ` (${around(k)})`;
-  return prose(text.replace("give k as an interval", `give k as an interval${example}`)).replace(
-    /[^.!?]$/,
-    "$&.",
-  );
-}
+/** A remark in the page's signs. */
+const sentence = (text) => prose(text).replace(/[^.!?]$/, "$&.");
 
 /** Rows of the model, with which the number says less than it seems to. */
 const DOUBTS = ["first order", "std"];
 
 /**
- * What is said of the number, the most urgent first: { row, words, doubt }.  The first of them is
- * its line of advice.
+ * What is said of the number, the most urgent first: { row, words, doubt, own }, `own` where it is
+ * no remark on the model.  The first of them is its line of advice.
  */
 function sayings(answer) {
-  const {
-    remarks = [],
-    model = [],
-    inputs,
-    mu_macro: mu,
-    mu_macro_low: low,
-    mu_macro_high: high,
-  } = answer;
+  const { remarks = [], model = [], inputs, mu_macro: mu } = answer;
   const said = new Set(remarks.map(({ row }) => row));
   const named = {
     std: "standard deviation",
     units: "check the units",
-    [STIFFNESS]: "rigid contact", // which is said of no other one as a remark
+    [STIFFNESS]: "rigid contact", // of which alone it is a remark
     ...(answer.state.contact === "ball" && { "one spring": "a ball" }),
   };
-  const calm = (text) => text.replace(/: give k as an interval, or fit k$/, "");
-  const rows = [...remarks, ...model.filter(({ row }) => !said.has(row))].map((note) => {
-    const { row, effect } = note;
-    const text = note.text.replace(/^rigid: /, "");
-    return {
-      known: row === STIFFNESS,
-      words: capital(sentence(row === STIFFNESS && effect < SLIGHT ? calm(text) : text, inputs)),
-      doubt: (said.has(row) && text !== ALWAYS) || DOUBTS.includes(row),
-      row: named[row] ?? row,
-    };
-  });
-  for (const one of rows)
-    if (one.known && !said.has(STIFFNESS)) Object.assign(one, deciding(answer, one.words));
+  const stiffness = model.find(({ row }) => row === STIFFNESS);
+  const others = model.filter((one) => one !== stiffness && !said.has(one.row));
+  const rows = [...remarks, ...others].map(({ row, text }) => ({
+    words: capital(sentence(text.replace(/^rigid: /, ""))),
+    doubt: (said.has(row) && !text.endsWith(ALWAYS)) || DOUBTS.includes(row),
+    row: named[row] ?? row,
+  }));
   const unit = inputs.k.unit ?? undefined;
   const ends = [inputs.k.low, inputs.k.high].map((end) => inUnit("k", end, unit));
-  const middle =
-    high > low
-      ? `k from ${ends.join(" to ")}; µ = ${friction(mu, FEW)} at ${middleOf(answer)} ` +
-        "(geometric mean)."
-      : "";
+  const middle = middleOf(answer);
   const own = [
-    { row: "interval", words: middle },
-    { row: "uncertainty", words: variance(answer) },
-  ].filter(({ words }) => words);
-  const known = rows.filter((one) => one.known);
+    middle && {
+      row: "interval",
+      words: `k from ${ends.join(" to ")}; µ = ${friction(mu, FEW)} at ${middle} (geometric mean).`,
+    },
+    answer.std && { row: "uncertainty", words: variance(answer) },
+    !middle && (stiffness || !answer.std) && !said.has(STIFFNESS)
+      ? deciding(answer, stiffness?.effect)
+      : null,
+  ];
   const doubts = rows.filter(({ doubt }) => doubt);
-  return [...new Set([...doubts, ...own, ...known, ...rows])];
+  const mine = own.filter((one) => one?.words).map((one) => ({ ...one, own: true }));
+  return [...new Set([...doubts, ...mine, ...rows])];
+}
+
+/** How many remarks the case has beside its line of advice, in words. */
+function counted(first, rest) {
+  const count = rest.filter(({ own }) => !own).length;
+  const more = first && !first.own ? "more " : "";
+  return `${count || "No"} ${more}remark${count === 1 ? "" : "s"} on this case`;
 }
 
 export function numberPanel(store) {
@@ -253,11 +249,19 @@ export function numberPanel(store) {
     return whole(shown ? `${reason} The number shown is that of ${otherwise(shown)}.` : reason);
   }
 
+  /** What can be done about a stiffness that matters. */
+  function remedies(k) {
+    if (!k) return nothing;
+    const range = around(k);
+    const words = `Give k as ${range.replace("..", " to ")}`;
+    return html`<button id="give" @click=${() => store.change({ k: range })}>${words}</button>
+      <button @click=${() => store.look({ panel: "fit" })}>Fit k</button>`;
+  }
+
   $("number").replaceChildren(); // what stands there until the first answer
   return (answer, trouble, old) => {
     const faults = [...(trouble?.faults?.keys() ?? [])];
-    write("status", reasons(trouble, faults, old ? answer.state : null));
-    $("status").classList.toggle("bad", Boolean(trouble && !trouble.calm));
+    tell("status", reasons(trouble, faults, old ? answer.state : null), trouble?.calm);
     for (const part of document.querySelectorAll(".result")) part.classList.toggle("old", old);
     if (!answer) {
       render(html`<output id="mu" for="fields">…</output>`, $("number"));
@@ -274,11 +278,13 @@ export function numberPanel(store) {
     write("share", remains(answer));
     write("regime", whole(spread(answer)));
     $("regime").classList.toggle("two", middleOf(answer) !== "");
-    if (store.state.motion === "one") write("short", shortOf(answer, old ? faults : []));
+    if (store.state.motion === "one") write("short", shortOf(answer, faults, old));
     $("advice").classList.toggle("old", old || store.dragged);
     if (store.dragged) return; // words may grow, and would move the map that is dragged
     const [first, ...rest] = sayings(answer);
     const said = ({ row, words }) => html`<b>${capital(row)}.</b> ${whole(words)}`;
+    render(remedies(first?.remedy), $("remedies"));
+    write("validity", counted(first, rest));
     render(first ? said(first) : nothing, $("advice"));
     $("advice").classList.toggle("doubt", Boolean(first?.doubt));
     for (const part of document.querySelectorAll("[data-of]"))

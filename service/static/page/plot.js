@@ -9,6 +9,7 @@ const NARROW = 240; // pixels of a frame, in which the name of a regime has a li
 const RADIUS = 7; // pixels of the user's point
 const CAP = 5; // pixels of the cap of a bar, to either side
 const BAR = 40; // places of a bar, at which it may lie on a text
+const TICKS = 10; // of a linear axis, about, at most
 const FLAT = 2; // pixels of half the width of an ellipse, below which it is drawn as a bar
 const FINGER = 36; // pixels from the point, within which a finger takes it
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -65,7 +66,8 @@ function ticked(axis, scale, room) {
   const [from, to] = scale.range();
   const most = Math.max(2, Math.floor(Math.abs(to - from) / room));
   if (!scale.base) {
-    return axis.tickValues(scale.ticks(most)).tickFormat(scale.tickFormat(most));
+    const few = Math.min(most, TICKS);
+    return axis.tickValues(scale.ticks(few)).tickFormat(scale.tickFormat(few));
   }
   const whole = decades(scale, most);
   if (whole.length > 1) return axis.tickValues(whole).tickFormat(decade);
@@ -93,7 +95,7 @@ const overlap = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[
  */
 export class Plot {
   constructor(svg, paint, mark = () => {}) {
-    Object.assign(this, { svg, paint, mark, stale: true, centred: [] });
+    Object.assign(this, { svg, paint, mark, stale: true, centred: [], lines: [] });
     plots.push(this);
     new ResizeObserver(([{ contentRect }]) => {
       [this.width, this.height] = [contentRect.width, contentRect.height].map(Math.round);
@@ -125,31 +127,36 @@ export class Plot {
   draw() {
     const { width, height } = this;
     if (!width || !height) return;
+    this.covers = [];
     if (this.stale) {
       this.stale = false;
+      this.taken = [];
       this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
       this.paint(this);
       this.centre();
+      this.below = this.taken;
     }
     if (!this.marks) return;
     [this.inside, this.over] = this.marks;
     for (const group of this.marks) group.selectAll("*").remove();
-    this.covers = [];
-    this.open = false; // whether a bar is drawn
+    this.taken = [...this.below];
+    this.open = false; // whether the user's point has a bar
     this.mark(this);
+    this.cross(this.crossed);
     this.uncover();
   }
 
   /**
    * Two axes with titles, and where it is asked faint `lines` at the ticks of y; so many pixels are
-   * left free above, to the right and below.
+   * left free above, to the right and below; `slim` where there is little room beside it.
    */
-  axes({ x, y, top = 10, right = 24, below = 0, lines = false }) {
+  axes({ x, y, top = 10, right = 24, below = 0, lines = false, slim = false }) {
+    this.lines = [];
     const foot = 42 + below;
     this.y = scaleOf(y).range([this.height - foot, top]);
     const side = ticked(axisLeft(this.y).tickSizeOuter(0), this.y, 44);
     const numbers = side.tickValues().map((value) => side.tickFormat()(value).length);
-    const left = 56 + DIGIT * Math.max(0, ...numbers.map((length) => length - 4));
+    const left = (slim ? 48 : 56) + DIGIT * Math.max(0, ...numbers.map((length) => length - 4));
     this.box = {
       x: left,
       y: top,
@@ -185,7 +192,7 @@ export class Plot {
       .attr("class", "axis")
       .attr("transform", `translate(${box.x} 0)`);
     bottom.call(ticked(axisBottom(this.x).tickSizeOuter(0), this.x, 44));
-    beside.call(side);
+    if (!y.bare) beside.call(side);
     const title = (text, place) =>
       root.append("text").attr("class", "title").attr("transform", place).text(text);
     title(x.title, `translate(${box.x + box.width / 2} ${this.height - below - 8})`);
@@ -196,19 +203,19 @@ export class Plot {
     return this;
   }
 
-  /** A second pair of axes above and to the right, in the upper layer. */
+  /** A second axis above, and where it is given to the right, in the upper layer. */
   outerAxes({ x, y }) {
     const { box, over } = this;
-    const [across, up] = [scaleOf(x), scaleOf(y)];
-    across.range([box.x, box.x + box.width]);
-    up.range([box.y + box.height, box.y]);
+    const across = scaleOf(x).range([box.x, box.x + box.width]);
     const axis = (made, place) =>
       over.append("g").attr("class", "axis").attr("transform", place).call(made);
-    axis(ticked(axisTop(across).tickSizeOuter(0), across, 44), `translate(0 ${box.y})`);
-    axis(ticked(axisRight(up).tickSizeOuter(0), up, 34), `translate(${box.x + box.width} 0)`);
     const title = (text, place) =>
       over.append("text").attr("class", "title").attr("transform", place).text(text);
+    axis(ticked(axisTop(across).tickSizeOuter(0), across, 44), `translate(0 ${box.y})`);
     title(x.title, `translate(${box.x + box.width / 2} 12)`);
+    if (!y) return;
+    const up = scaleOf(y).range([box.y + box.height, box.y]);
+    axis(ticked(axisRight(up).tickSizeOuter(0), up, 34), `translate(${box.x + box.width} 0)`);
     title(y.title, `translate(${this.width - 12} ${box.y + box.height / 2}) rotate(90)`);
   }
 
@@ -266,28 +273,83 @@ export class Plot {
   /** The name of a regime about a place, with two lines where the frame is narrow. */
   area(words, x, y, className) {
     const last = words.lastIndexOf(" ");
-    if (this.box.width >= NARROW || last < 0) return this.text(words, x, y, className);
-    const text = this.text("", x, y, className);
-    for (const [i, line] of [words.slice(0, last), words.slice(last + 1)].entries())
-      text
-        .append("tspan")
-        .attr("x", x)
-        .attr("dy", i ? "1.1em" : 0)
-        .text(line);
-    return text;
+    const narrow = this.box.width < NARROW && last > 0;
+    const lines = narrow ? `${words.slice(0, last)}\n${words.slice(last + 1)}` : words;
+    return this.text(lines, x, y, className);
   }
 
-  /** A text at a place; a centred one of the lower layer is kept within the frame. */
+  /** A text of one or more lines at a place; a centred one of the lower layer is kept within the
+   * frame. */
   text(words, x, y, className, anchor = "middle") {
     const text = this.over
       .append("text")
       .attr("class", className)
       .attr("text-anchor", anchor)
       .attr("x", x)
-      .attr("y", y)
-      .text(words);
+      .attr("y", y);
+    const lines = words.split("\n");
+    if (lines.length === 1) text.text(words);
+    else
+      for (const [i, one] of lines.entries())
+        text
+          .append("tspan")
+          .attr("x", x)
+          .attr("dy", i ? "1.1em" : 0)
+          .text(one);
     if (anchor === "middle") this.centred.push([text, x]);
     return text;
+  }
+
+  /** Notes a line, which `label` gives way to. */
+  avoid(points) {
+    const places = points.map(([x, y]) => [this.x(x), this.y(y)]);
+    places.slice(1).forEach(([x, y], i) => {
+      const [left, top] = places[i];
+      this.lines.push([Math.min(left, x), Math.min(top, y) - 1, x + 1, Math.max(top, y) + 1]);
+    });
+  }
+
+  /**
+   * The first of some texts that has room at one of several places { x, y, anchor }, in the frame
+   * and clear of lines, points and other labels; none where there is no room.
+   */
+  label(texts, places, className) {
+    const { box } = this;
+    for (const words of texts) {
+      const text = this.text(words, 0, 0, className, "start");
+      const { y: top, width, height } = text.node().getBBox();
+      const boxOf = ({ x, y, anchor }) => {
+        const left = x - { start: 0, middle: 0.5, end: 1 }[anchor] * width;
+        return [left - 2, y + top, left + width + 2, y + top + height];
+      };
+      const free = places.find((one) => {
+        const [left, upper, right, foot] = boxOf(one);
+        const held = left >= box.x && right <= box.x + box.width;
+        if (!held || upper < box.y || foot > box.y + box.height) return false;
+        const others = [...this.lines, ...this.taken, ...this.covers];
+        return !others.some((other) => overlap(boxOf(one), other));
+      });
+      if (free) {
+        const place = boxOf(free);
+        this.taken.push(place);
+        text.attr("x", place[0] + 2).attr("y", free.y);
+        text.selectAll("tspan").attr("x", place[0] + 2);
+        return;
+      }
+      text.remove();
+    }
+  }
+
+  /** A thin cross at a place of the frame, or none. */
+  cross(place) {
+    const { box } = this;
+    this.crossed = place;
+    if (!this.marks) return;
+    const group = this.marks[1];
+    group.selectAll(".cross").remove();
+    if (!place) return;
+    const shape = `M${box.x} ${place[1]}h${box.width}M${place[0]} ${box.y}v${box.height}`;
+    group.insert("path", ":first-child").attr("class", "cross").attr("d", shape);
   }
 
   /**
@@ -325,14 +387,14 @@ export class Plot {
   /** A bar between two places in pixels. */
   stroke(ends) {
     const [[left, foot], [right, top]] = ends;
+    this.open = true;
+    if (Math.hypot(right - left, top - foot) < 2 * RADIUS) return; // it is within the ring
     for (let i = 0; i <= BAR; i += 1)
       this.cover(left + (i / BAR) * (right - left), foot + (i / BAR) * (top - foot), 3);
-    const length = Math.hypot(right - left, top - foot) || 1;
+    const length = Math.hypot(right - left, top - foot);
     const [across, down] = [foot - top, right - left].map((one) => (CAP * one) / length);
-    const shown = length > 2 * RADIUS ? ends : []; // within the point there is no room
     const cap = ([x, y]) => `M${x - across} ${y - down}L${x + across} ${y + down}`;
-    this.rimmed(`M${left} ${foot}L${right} ${top}${shown.map(cap).join("")}`, "deviation");
-    this.open = true;
+    this.rimmed(`M${left} ${foot}L${right} ${top}${ends.map(cap).join("")}`, "deviation");
   }
 
   /**
@@ -355,7 +417,7 @@ export class Plot {
       top + along * sin + across * cos,
     ];
     const ends = [at(-long, 0), at(long, 0)];
-    if (short < FLAT) return this.stroke(ends);
+    if (short < FLAT || long < RADIUS) return this.stroke(ends);
     for (let i = 0; i < BAR; i += 1) {
       const angle = (2 * Math.PI * i) / BAR;
       this.cover(...at(long * Math.cos(angle), short * Math.sin(angle)), 3);

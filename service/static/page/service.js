@@ -32,8 +32,7 @@ async function ask(path, options) {
     response = await fetch(path, { ...options, signal: AbortSignal.timeout(WAIT_MS) });
     body = await response.json();
   } catch (error) {
-    if (!response || error.name === "TimeoutError")
-      return { later: "No answer from the service." };
+    if (!response || error.name === "TimeoutError") return { later: "No answer from the service." };
     return { later: `The response of the service cannot be read (status ${response.status}).` };
   }
   if (response.ok) return { answer: body };

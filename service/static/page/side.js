@@ -1,7 +1,7 @@
 // Beside the law: the other numbers of the case, how much each input matters, and which value of
 // an input reaches a target.
 import { Channel } from "./ask.js";
-import { $, write } from "./dom.js";
+import { $, tell, write } from "./dom.js";
 import { html, nothing, render, svg } from "../lib/lit-html.js";
 import { list } from "./meanings.js";
 import { inLine, peakOf, sensitivities } from "./number.js";
@@ -14,6 +14,7 @@ import {
   inWords,
   middleOf,
   prefixed,
+  prose,
   show,
   unitAt,
   whole,
@@ -49,6 +50,7 @@ function tabs(id, chosen = () => {}) {
   return (name) => turn(buttons.find((one) => one.id === `tab-${name}`));
 }
 
+const TAKEN = 6; // digits of a value that is taken into the form
 const MOST = 7; // digits that have room beside a unit
 
 /** The other numbers of a case, as `list` takes them. */
@@ -180,35 +182,58 @@ function bars(answer) {
   </table>`;
 }
 
-/** `found(mark)` hears of the target that is asked for, null of none. */
+/** `found(mark)` hears of the target that is asked for while its tab is open, else null. */
 export function sidePanel(store, moved, found) {
   let answer, asked, solved;
-  let refusal = null;
+  let helpful = []; // other inputs that can reach a target which this one cannot
   const channel = new Channel(
-    (question) => post("v1/solve-for", question),
-    (reply, question) => {
-      asked = JSON.stringify(question);
-      solved = { reply, question };
+    (body) => post("v1/solve-for", body),
+    (reply, body) => {
+      if (JSON.stringify(body) !== asked) return; // the tab was closed
+      solved = reply;
+      helpful = [];
+      if (!reply.results[0].roots.length) others.push(alternatives());
       draw();
       found(markOf());
     },
-    (reason) => {
-      refusal = reason;
-      compare();
+    (reason, calm) => {
+      tell("solve-status", reason && prose(reason), calm);
+      if (!reason || calm) return;
+      solved = null;
+      draw();
+      found(null);
     },
   );
+  /** Asks for the target by each of the other inputs at once; what cannot be asked is no help. */
+  const others = new Channel(
+    async (bodies) => {
+      const replies = await Promise.all(bodies.map((body) => post("v1/solve-for", body)));
+      return replies.find((one) => one.later || one.key) ?? { answer: replies };
+    },
+    (replies) => {
+      helpful = replies
+        .filter((one) => one.answer?.results[0].roots.length)
+        .map((one) => one.answer.unknown);
+      draw();
+    },
+    () => {},
+  );
+  const alternatives = () =>
+    inputsOf(store.state)
+      .filter((name) => name !== store.state.unknown)
+      .filter((name) => name !== "k" || store.state.contact !== "rigid")
+      .map((name) => question(name));
 
   /** The target's line in the plots. */
   function markOf() {
-    const { reply, question } = solved;
+    const { unknown, quantity, results: found } = solved;
     const mu0 = answer.inputs.mu0.value;
-    const mu =
-      reply.quantity === "mu_ratio" ? reply.results[0].target * mu0 : reply.results[0].target;
-    return { along: reply.unknown, mu_macro: mu, mu_ratio: mu / mu0, question };
+    const mu = quantity === "mu_ratio" ? found[0].target * mu0 : found[0].target;
+    return { along: unknown, mu_macro: mu, mu_ratio: mu / mu0 };
   }
 
-  function question() {
-    const { unknown, quantity, target } = store.state;
+  function question(unknown = store.state.unknown) {
+    const { quantity, target } = store.state;
     const power =
       store.state.direction !== "normal" && store.state.contact !== "rigid"
         ? { include: ["power"] }
@@ -216,53 +241,60 @@ export function sidePanel(store, moved, found) {
     return { ...caseAround(store.state, answer, unknown), unknown, quantity, target, ...power };
   }
 
+  /** The values that reach the target; where there is none, which inputs can. */
   function draw() {
-    const { reply } = solved;
-    const { unknown, reachable, results } = reply;
+    render(solved ? results(solved) : nothing, $("solve-result"));
+  }
+
+  function results({ unknown, reachable, results: [{ roots }] }) {
     const typed = answer.inputs[unknown]?.unit;
-    const [{ roots }] = results;
+    const { symbol } = about.inputs[unknown];
     const line = ({ value, mu_macro: mu, regime, power }) => {
-      const digits = store.state.digits === "all" ? 6 : 4;
-      const shown = inUnit(unknown, value, unitAt(unknown, value, typed), digits);
-      const text = `${about.inputs[unknown].symbol} = ${shown}`;
+      const text = `${symbol} = ${inUnit(unknown, value, unitAt(unknown, value, typed), TAKEN)}`;
       const shaker = power ? `, shaker ${prefixed(power.oscillation, "W")}` : "";
       return html`<li>
         <span><b>${text}</b>: µ = ${friction(mu, 4)}, ${inWords(regime)}${shaker}</span>
         <button
           class="use"
           aria-label=${`Use ${text}`}
-          @click=${() => moved({ [unknown]: value }, 6)}
+          @click=${() => moved({ [unknown]: value }, TAKEN)}
         >
           Use
         </button>
       </li>`;
     };
+    if (roots.length) return roots.map(line);
     const range = `${show(reachable.min)} to ${show(reachable.max)}`;
-    const none = `No value gives that: here it can be ${range}.`;
-    render(roots.length ? roots.map(line) : html`<li>${none}</li>`, $("solve-result"));
-    compare();
+    const none = `No value of ${symbol} gives that: here it can be ${range}.`;
+    const other = (name) =>
+      html`<button data-try=${name} @click=${() => store.change({ unknown: name })}>
+        try ${about.inputs[name].symbol}
+      </button>`;
+    return html`<li>${none}</li>
+      <li class="ways">${helpful.map(other)}</li>`;
   }
 
-  /** A result of other values is grey; a refusal says why there is no other. */
-  function compare() {
-    const old = Boolean(solved && answer && JSON.stringify(question()) !== asked);
-    $("solve-result").classList.toggle("old", old);
-    write("solve-status", refusal ?? (old ? "This was asked with other values." : ""));
-    $("solve-status").classList.toggle("bad", refusal !== null);
-  }
-
-  $("solve-form").addEventListener("submit", (event) => {
-    event.preventDefault();
-    const form = new FormData($("solve-form"));
-    store.change(Object.fromEntries(form));
-    if (answer) channel.push(question());
-  });
+  $("solve-form").addEventListener("submit", (event) => event.preventDefault());
   $("solve-form").addEventListener("change", ({ target: { name, value } }) =>
     store.change({ [name]: value }),
   );
+  /** Solves while the tab is open, and the case has a number. */
+  function solve(old) {
+    const open = store.state.side === "target";
+    if (!open && asked) {
+      asked = solved = null;
+      found(null);
+    }
+    if (!open || old) return;
+    const body = question();
+    const words = JSON.stringify(body);
+    if (words === asked) return;
+    asked = words;
+    channel.push(body);
+  }
   const tab = tabs("side-tabs", (side) => store.look({ side }));
 
-  return (latest) => {
+  return (latest, old) => {
     answer = latest;
     tab(store.state.side);
     const names = inputsOf(store.state);
@@ -280,7 +312,8 @@ export function sidePanel(store, moved, found) {
     const rest = middle ? `at ${middle}` : answer.std && "without\u00a0±";
     write("middle", rest ? whole(`µ = ${inLine(answer)}; all else ${rest}.`) : "");
     list("values", numbers(answer, store.state.digits === "all"), origin);
+    write("bars-of", whole(`Change of µ when an input grows by 1 %${middle && `, at ${middle}`}`));
     render(bars(answer), $("bars"));
-    compare();
+    solve(old);
   };
 }

@@ -1,6 +1,10 @@
 // The state of the page: what is chosen, and the inputs as they were typed.  It reads no number.
 //
 // The address holds it as text, and every change is one entry of the history, a drag as a whole.
+import { inUnit } from "./words.js";
+
+const ALL = 15; // digits of a value that was typed
+const FEW = 6; // digits of the middle of an interval
 
 /** The six inputs by direction, in the order of the form. */
 export const inputsOf = ({ direction }) => [
@@ -124,14 +128,20 @@ export const uncertainOf = (state, answer, question) =>
     (name) => answer?.inputs[name]?.std && answer.state[name] === state[name],
   );
 
+/** What the service understood of an input as a text, in the unit that was typed. */
+const valueOf = (answer, name, digits) => {
+  const { value, unit } = answer.inputs[name];
+  return inUnit(name, value, unit ?? undefined, digits);
+};
+
 /**
  * The inputs without deviations, for questions that have none (targets, fits, motions):
- * the value that the service understood stands in place of a text with a deviation.
+ * the value alone stands in place of a text with a deviation.
  */
 export function exactCase(state, answer, without = []) {
   const question = caseOf(state, without);
   for (const name of uncertainOf(state, answer, question))
-    question[name] = answer.inputs[name].value;
+    question[name] = valueOf(answer, name, ALL);
   return question;
 }
 
@@ -143,8 +153,8 @@ export const partsOf = ({ contact }) =>
  * interval of k its middle. */
 export function motionOf(state, answer, without = []) {
   const { direction: _, ...body } = exactCase(state, answer, ["y0", "Fz_amplitude", ...without]);
-  const { high, value } = answer?.inputs.k ?? {};
-  if (high !== undefined && body.k === answer.state.k) body.k = value;
+  if (answer?.inputs.k.high !== undefined && body.k === answer.state.k)
+    body.k = valueOf(answer, "k", FEW);
   const parts = partsOf(state).filter((name) => state[name].trim());
   return { ...body, ...Object.fromEntries(parts.map((name) => [name, state[name]])) };
 }

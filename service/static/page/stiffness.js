@@ -1,6 +1,6 @@
 // The panel "k from materials": a geometry, two bodies, and the k that follows.
 import { Channel } from "./ask.js";
-import { $, write } from "./dom.js";
+import { $, tell } from "./dom.js";
 import { html, nothing, render } from "../lib/lit-html.js";
 import { post } from "./service.js";
 import { about, called, inUnit, prefixed, prose } from "./words.js";
@@ -20,6 +20,11 @@ const SIZES = ["radius", "diameter"];
 /** Of a body, two of which share a row. */
 const BODIES = ["E", "nu", "E2", "nu2"];
 
+/** What k is that of. */
+const MODELS = { ball: "a ball", spring: "one spring" };
+/** What may be left out. */
+const OPTIONAL = ["E2", "nu2", "oscillation"];
+
 export function stiffnessPanel(store, moved) {
   const typed = { geometry: "ball", size: "radius" }; // a ball has a radius or a diameter
   let faults = new Map();
@@ -32,8 +37,11 @@ export function stiffnessPanel(store, moved) {
     about.geometries[typed.geometry].arguments
       .filter((name) => name !== "Fz")
       .map((name) => (name === "radius" ? typed.size : name));
+  const isFilled = (name) => Boolean(typed[name]?.trim());
+  /** What is missed when k is asked for. */
+  const missing = () => names().filter((name) => !isFilled(name) && !OPTIONAL.includes(name));
   const question = () => {
-    const filled = names().filter((name) => typed[name]?.trim());
+    const filled = names().filter(isFilled);
     return {
       geometry: typed.geometry,
       Fz: store.state.Fz,
@@ -45,16 +53,18 @@ export function stiffnessPanel(store, moved) {
     (body) => post("v1/stiffness", body),
     (reply, body) => {
       [answer, asked, faults, inputs] = [reply, JSON.stringify(body), new Map(), reply.inputs];
-      write("stiffness-status", "");
+      tell("stiffness-status", "");
       draw();
     },
-    (reason, _, reply) => {
+    (reason, calm, reply) => {
       const all = (reply?.faults ?? []).map(({ field, reason: why }) => [field, why]);
-      // what is not typed yet is missed when k is asked for
-      faults = new Map(all.filter(([field]) => whole || typed[field]?.trim() || field === "Fz"));
+      faults = new Map([
+        ...(whole ? missing() : []).map((field) => [field, "is required"]),
+        ...all.filter(([field]) => whole || isFilled(field) || field === "Fz"),
+      ]);
       inputs = reply?.inputs ?? {};
       const told = [...faults.keys()].every((field) => names().includes(field)); // at the fields
-      write("stiffness-status", reason && !(told && all.length) ? reason : "");
+      tell("stiffness-status", reason && !(told && all.length) ? reason : "", calm);
       draw();
     },
   );
@@ -156,12 +166,12 @@ export function stiffnessPanel(store, moved) {
 
   function result() {
     if (!answer) return nothing;
-    const model = answer.contact === "ball" ? "ball (Hertz)" : "one spring";
     const k = inUnit("k", answer.k);
-    const use = () => moved({ k: answer.k }, 6, { contact: answer.contact });
+    const use = () => moved({ k: answer.k }, undefined, { contact: answer.contact });
+    const how = `Use, as ${MODELS[answer.contact]}`;
     return html`<li class=${JSON.stringify(question()) === asked ? "" : "old"}>
-        <span><b>k = ${k}</b> at Fz = ${store.state.Fz}; contact: ${model}</span>
-        <button class="use" aria-label=${`Use k = ${k}`} @click=${use}>Use</button>
+        <span><b>k = ${k}</b> at Fz = ${store.state.Fz}</span>
+        <button class="use" aria-label=${`${how}: k = ${k}`} @click=${use}>${how}</button>
       </li>
       ${answer.warnings.map((text) => html`<li class="doubt">${prose(text)}</li>`)}`;
   }

@@ -23,7 +23,7 @@ inputs, each as name=value, in SI units or with a unit as in v0=1cm/s:
   v0     {in_help("v0")}: that of the drag along x
 an oscillation is amplitude@phase, of several harmonics a list such as 2um,3:0.4um@90deg
 """
-_SI = {"t": "s", "x": "m", "y": "m", "Fx": "N", "Fy": "N", "Fz": "N"}
+_SI = {"t": "s", "x": "m", "y": "m", "Fx": "N", "Fy": "N", "Fz": "N", "share": "-"}
 
 
 def add_parts(parser: argparse.ArgumentParser) -> None:

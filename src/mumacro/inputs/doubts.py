@@ -127,7 +127,7 @@ def remarks_on_motion(
     ...     [remark] = remarks_on_motion(one, {"x": np.array([size])})
     ...     remark.row, remark.field, remark.text
     ('units', 'x', 'x = 1 m, usual is 1 pm to 20 mm: is it in metres?')
-    ('model', 'x', 'x = 0: the contact is not shaken, mu_macro is mu0')
+    ('model', 'x', 'nothing oscillates: mu_macro is mu0')
     """
     found: list[Note] = []
     for name, size in amplitudes.items():
@@ -141,8 +141,7 @@ def remarks_on_motion(
         legal &= np.isfinite(columns[name]) & (columns[name] > 0.0)
     still = legal & np.all([size == 0.0 for size in amplitudes.values()], axis=0)
     if still.any():
-        parts = " = ".join(amplitudes)
-        text = f"{parts} = 0: the contact is not shaken, mu_macro is mu0"
+        text = "nothing oscillates: mu_macro is mu0"
         count = int(np.count_nonzero(still))
         found.append(Note(REMARK, text, MODEL, next(iter(amplitudes)), cases=count))
     return found

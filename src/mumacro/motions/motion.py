@@ -62,6 +62,7 @@ class _Cycle(NamedTuple):
     Fx: Array  #: force on it along the drag [N]; its mean is mu_macro Fz
     Fy: Array  #: force across [N]
     Fz: Array  #: normal force [N]
+    share: Array  #: size of the force along and across over mu0 Fz [-]: 1 while a spring slips
 
 
 class Cycle(Result, _Cycle):
@@ -183,7 +184,8 @@ class Motion(Result):
             for part in scenes.terms
         )
         Fx, Fy = mu0 * Fz * forces.T
-        return Cycle(tau / omega, v0 * (tau / omega) + x, y, Fx, Fy, Fz + load)
+        share = np.hypot(*forces.T) / (1.0 + load / Fz)
+        return Cycle(tau / omega, v0 * (tau / omega) + x, y, Fx, Fy, Fz + load, share)
 
     def plot(self, ax: Any = None, *, index: int | None = None) -> Any:
         """Draw the forces over a period, and next to them the path of the upper point with the
@@ -201,7 +203,7 @@ class Motion(Result):
         )
         words = plotting.motion_words(dict(zip(PARTS, terms, strict=True)))
         title = f"{title}\n{words}".rstrip()
-        return plotting.plot_cycle(*self.cycle(index), case["mu0"], title, ax)
+        return plotting.plot_cycle(*self.cycle(index)[:-1], case["mu0"], title, ax)
 
     def _place(self, index: int | None) -> int:
         n = np.size(self.mu_macro)
