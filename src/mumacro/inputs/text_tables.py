@@ -21,6 +21,7 @@ from mumacro.errors import TextError
 from mumacro.inputs.cells import (
     BLANKS,
     COMMENT,
+    GAPS,
     MOST_COLUMNS,
     Cell,
     Signs,
@@ -256,16 +257,11 @@ class TextTable:
         words += ["decimal comma"] if self.signs.decimal == "," else []
         words += [f"{_WORDS_OF_SIGNS[grouped]} between thousands"] if grouped else []
         words += [f"header in line {self.header.start + 1}"] if self.header.start else []
-        lines = sorted(units.lines)
-        places = ", ".join(map(str, lines))
-        words += [f"units in line{'s' * (len(lines) > 1)} {places}"] if lines else []
+        words += [f"units in {_listed(units.lines)}"] if units.lines else []
         words += [f"rows {self.first}..{self.last}"] if self.last else []
         of_inputs = ", ".join(f"{name} [{unit}]" for name, unit in units.of_inputs().items())
-        again = sorted(self.repeated)
-        rest = f" and {len(again) - 5:,} more" if len(again) > 5 else ""
-        places = f"{'s' * (len(again) > 1)} {', '.join(map(str, again[:5]))}{rest}"
-        left_out = f"; the header again in line{places}, left out" if again else ""
-        return f"{self._sheets}{', '.join(words)}; {of_inputs}{left_out}"
+        again = f"; the header again in {_listed(self.repeated)}, left out" if self.repeated else ""
+        return f"{self._sheets}{', '.join(words)}; {of_inputs}{again}"
 
     # --- rows -------------------------------------------------------------------------------------
 
@@ -324,7 +320,7 @@ class TextTable:
                 self.open.append(line)
                 return None
             end = closing.end()
-        elif is_comment(line) and not self._has_name(line):
+        elif is_comment(line) and not self._may_begin_row(line):
             return line
         rest = line[end:]
         rest = _BEHIND_BLANKS[sep].sub(r"\1", rest) if ' "' in rest else rest
@@ -387,7 +383,9 @@ class TextTable:
             return Line.EMPTY
         if self._may_be_header(text) and self._repeats_header(line, text):
             return self._again(line)
-        if is_comment(text) and not (self._has_name(text) and len(self._cells(text)) == self.width):
+        if is_comment(text) and not (
+            self._may_begin_row(text) and len(self._cells(text)) == self.width
+        ):
             if "\n" in text:
                 raise TextError(f"line {line}: a quote in a comment is not closed: leave it out")
             self.units.take(line, text)
@@ -430,10 +428,12 @@ class TextTable:
             return split_header(text, BLANKS)
         return split_row(text, self.sep)
 
-    def _has_name(self, text: str) -> bool:
+    def _may_begin_row(self, text: str) -> bool:
         """Return whether a line that begins like a comment may be a row whose first cell is a name
-        such as #1."""
-        return 0 not in self.units.inputs and any(map(starts_as_number, self._cells(text)[1:]))
+        such as #1, or a gap such as #NV."""
+        first, *cells = self._cells(text)
+        is_first = 0 not in self.units.inputs or first.strip().lower() in GAPS
+        return is_first and any(map(starts_as_number, cells))
 
     def _remedy_of_units(self, line: int) -> str:
         return "leave one of them out" if not self.first else self.remedy(line)
@@ -495,6 +495,17 @@ def names_statistics(text: str) -> bool:
     (True, False)
     """
     return len(text) < 40 and _STATISTICS.fullmatch(text.lower()) is not None
+
+
+def _listed(lines: Iterable[int]) -> str:
+    """Return the first numbers of some lines.
+
+    >>> _listed([7]), _listed(range(1, 9))
+    ('line 7', 'lines 1, 2, 3, 4, 5 and 3 more')
+    """
+    numbers = sorted(lines)
+    rest = f" and {len(numbers) - 5:,} more" if len(numbers) > 5 else ""
+    return f"line{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers[:5]))}{rest}"
 
 
 def _irregular(count: int, width: int) -> str:

@@ -337,6 +337,17 @@ def test_rows_read_at_once_are_those_read_one_by_one(
     assert read[0] == read[1]
 
 
+@pytest.mark.parametrize("comment", ["", "# a comment, for which all lines are looked at\n"])
+def test_a_row_whose_first_cell_is_a_gap_such_as_nv_is_rejected(
+    tmp_path: Path, comment: str
+) -> None:
+    (tmp_path / "cases.csv").write_text(f"{HEAD}\n{comment}{ROWS}#N/A,10,1e6,3e-6,20000,0.01\n")
+    summary = evaluate_files([tmp_path / "cases.csv"], tmp_path / "out.csv", TABLE)
+    assert (summary.rows, summary.rejected) == (3, 1)
+    assert summary.rejects is not None
+    assert summary.rejects.read_text().endswith("mu0,#N/A,is missing\n")
+
+
 def test_the_decimal_sign_may_show_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(decoding, "PIECE", 100)
     row = "1;10;1000000;1;20000;1\n"

@@ -236,6 +236,7 @@ REFUSED: dict[str, tuple[str, Refused]] = {
     "title of a segment": (HEAD + BEGIN + "\nSegment 2\n" + MIDDLE, Refused(5, "--rows 2..4")),
     "label of a row behind it": (HEAD + BEGIN + ",Mittelwert:\n", Refused(4, "--rows 2..3")),
     "a cell beyond the header": (HEAD + "1,0.069\n2,0.097,7\n", Refused(3, "has 3 cells")),
+    "a gap that begins like a comment": (HEAD + "#NV,0.1\n" + PLAIN, Refused(2, "--rows 3..6")),
     "overload": (HEAD + "1,0.069\n2,OVER\n", Refused(3, "--rows 2..2")),
 }
 
