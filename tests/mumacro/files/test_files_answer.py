@@ -282,6 +282,7 @@ SIMILAR = "{!r} is similar: rename that column to {}"
                 ("k,f", "both f [Hz] and omega"),
                 ("k,k [N/mm]", "k is there twice"),
                 ("k,k_low", "both k and k_low"),
+                ("k_low,k_high,std_mu0", "both std_mu0 and an interval of k"),
                 ("k,note,note", "'note' is there twice"),
                 ("k,source", "'source' would be written twice"),
                 ("k_low", "no column k_high [N/m]"),
