@@ -122,11 +122,11 @@ export function lawPanel(store, moved) {
   const heights = () => (law.along === "mu0" ? law.values : [answer.inputs.mu0.value]);
   /** Both ends of what an interval or a deviation leaves open. */
   function band() {
-    const { mu_macro_low: low, mu_macro_high: high } = law;
+    const { mu_macro_low: low, mu_macro_high: high } = law ?? {};
     return low ? [low, high] : null;
   }
   /** What is drawn of the case itself. */
-  const own = () => endsOf(answer) ?? [answer.mu_macro];
+  const own = () => (band() ? null : endsOf(answer)) ?? [answer.mu_macro];
   /** The lower end of the axis of µ: 0, or a little below what is drawn where that is far above. */
   function bottom(top) {
     const drawn = [...own(), ...law.mu_static, ...law.mu_macro, ...(band() ?? []).flat()];
@@ -250,7 +250,11 @@ export function lawPanel(store, moved) {
     if (here === undefined) return;
     const x = toUnit(law.along, here, unit());
     const { low, high } = answer.inputs[law.along];
-    const ends = endsOf(answer);
+    // a deviation reaches as far as the band, which is not symmetric
+    const ends =
+      answer.std && band()
+        ? band().map((end) => end[bisectCenter(law.values, here)])
+        : endsOf(answer);
     if (high > low)
       plot.bar(...[low, high].map((end) => [toUnit(law.along, end, unit()), answer.mu_macro]));
     else if (ends) plot.bar(...ends.map((end) => [x, end]));
