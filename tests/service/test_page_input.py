@@ -7,7 +7,6 @@ import re
 import shlex
 import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,6 +14,7 @@ import pytest
 from mumacro import Surrogate
 from tests.support.browser import START
 from tests.support.comparing import close
+from tests.support.places import ROOT
 
 pytestmark = pytest.mark.slow
 
@@ -598,6 +598,18 @@ def test_a_link_reproduces_the_state(open_page: Any, surrogate: Surrogate) -> No
     assert not bad.find("#notice").is_displayed()
 
 
+def copied(page: Any, name: str) -> str:
+    """What the page gives to copy."""
+    page.click(f"#copy-row [data-copy={name}]")
+    return str(page.value("#copy-text"))
+
+
+def output(*words: str, text: str | None = None) -> str:
+    """What a program prints that is run from the root of the source tree."""
+    done = subprocess.run(words, input=text, cwd=ROOT, capture_output=True, text=True, check=True)
+    return done.stdout
+
+
 @pytest.mark.parametrize(
     "address",
     [
@@ -609,33 +621,21 @@ def test_a_link_reproduces_the_state(open_page: Any, surrogate: Surrogate) -> No
         "#mu0=0.3 ± 0.02&k=1 N/um ± 10 %",
     ],
 )
-def test_every_copy_of_a_case_gives_the_number_of_the_page(
-    open_page: Any, repository: Path, address: str
-) -> None:
+def test_every_copy_of_a_case_gives_the_number_of_the_page(open_page: Any, address: str) -> None:
     page = open_page(f"{address}&digits=all")
     number = float(page.text("#mu").split(" to ")[0])  # the value, or the lower end
     page_text = page.text("#mu")
     path = "mu_macro_low" if " to " in page_text else "mu_macro"
 
-    def copied(name: str) -> str:
-        page.click(f"[data-copy={name}]")
-        return str(page.value("#copy-text"))
-
-    def output(*words: str, text: str | None = None) -> str:
-        done = subprocess.run(
-            words, input=text, cwd=repository, capture_output=True, text=True, check=True
-        )
-        return done.stdout
-
-    python = output(sys.executable, "-", text=copied("python"))
+    python = output(sys.executable, "-", text=copied(page, "python"))
     assert float(re.findall(rf"{path} +(\S+)", python)[0]) == close(number, rel=1e-5)
     assert ("std " in python) is ("±" in address)
-    words = shlex.split(copied("command"))
+    words = shlex.split(copied(page, "command"))
     command = output(sys.executable, "-m", *words, "--json")
     assert float(re.findall(rf'"{path}": ([^,\s]+)', command)[0]) == close(number, rel=1e-8)
-    curl = output(*shlex.split(copied("curl")))
+    curl = output(*shlex.split(copied(page, "curl")))
     assert float(re.findall(rf'"{path}":([^,\s]+)', curl)[0]) == close(number, rel=1e-8)
-    link = open_page("#" + copied("link").partition("#")[2])
+    link = open_page("#" + copied(page, "link").partition("#")[2])
     assert link.text("#mu") == page_text
 
 
@@ -685,30 +685,18 @@ MOTIONS = [
 
 
 @pytest.mark.parametrize("address", MOTIONS)
-def test_every_copy_of_a_motion_gives_the_number_of_the_page(
-    open_page: Any, repository: Path, address: str
-) -> None:
+def test_every_copy_of_a_motion_gives_the_number_of_the_page(open_page: Any, address: str) -> None:
     page = open_page(f"#motion=any{address}")
     number = page.number("#motion-values dd")
 
-    def copied(name: str) -> str:
-        page.click(f"#copy-row [data-copy={name}]")
-        return str(page.value("#copy-text"))
-
-    def output(*words: str, text: str | None = None) -> str:
-        done = subprocess.run(
-            words, input=text, cwd=repository, capture_output=True, text=True, check=True
-        )
-        return done.stdout
-
-    python = float(output(sys.executable, "-", text=copied("python")))
+    python = float(output(sys.executable, "-", text=copied(page, "python")))
     digits = len(page.text("#motion-values dd").partition(".")[2])
     assert number == round(python, digits)  # which are those within its error
-    command = output(sys.executable, "-m", *shlex.split(copied("command")), "--json")
+    command = output(sys.executable, "-m", *shlex.split(copied(page, "command")), "--json")
     assert float(re.findall(r'"mu_macro": ([^,\s]+)', command)[0]) == close(python, rel=1e-9)
-    curl = output(*shlex.split(copied("curl")))
+    curl = output(*shlex.split(copied(page, "curl")))
     assert float(re.findall(r'"mu_macro":([^,\s]+)', curl)[0]) == close(python, rel=1e-9)
-    link = open_page("#" + copied("link").partition("#")[2])
+    link = open_page("#" + copied(page, "link").partition("#")[2])
     assert link.number("#motion-values dd") == number
     # a motion has no deviation, and says so
     assert ("±" in address) is ("deviation (±)" in page.text("#motion-doubt"))

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import mumacro
 from builder.solver import compiled
 from builder.solver import sweep as module
 from builder.solver.slip import NO_STICK
@@ -74,64 +75,47 @@ def test_a_point_that_fails_is_named_with_advice(monkeypatch: pytest.MonkeyPatch
     assert str(caught.value) == f"2 of 3 points failed, first v~=0.2, y~=0.5: {ADVICE[NO_STICK]}"
 
 
-@pytest.mark.parametrize(("place", "pattern"), compiled.SOURCES)
-def test_the_digest_covers_sources_and_compiler(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: Path, pattern: str
-) -> None:
-    digests = {compiled.source_digest()}
-    copies = tmp_path / "sources"
-    for source in place.rglob(pattern):
-        copy = copies / source.relative_to(place)
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        copy.write_bytes(source.read_bytes())
-    assert list(copies.iterdir())
-    sources = [
-        (copies if entry == (place, pattern) else entry[0], entry[1]) for entry in compiled.SOURCES
-    ]
-    monkeypatch.setattr(compiled, "SOURCES", sources)
-    assert digests == {compiled.source_digest()}  # wherever the sources stand
-    # a module that moves is not lost
-    added = copies / "folder" / pattern.replace("*", "zz").replace("[ch]", "h")
-    added.parent.mkdir()
-    for text in ("", "x = 1"):
-        added.write_text(text)
-        digests.add(compiled.source_digest())
-    monkeypatch.setattr("numba.__version__", "0.0.0")
-    digests.add(compiled.source_digest())
-    assert len(digests) == 4
-
-
-def test_compiled_functions_are_kept_until_a_source_changes(tmp_path: Path) -> None:
+def test_compiled_functions_are_kept_until_a_source_or_the_compiler_changes(tmp_path: Path) -> None:
     """Also a function whose own module stays the same, while one that it calls changes."""
-    package = tmp_path / "builder"
-    shutil.copytree(Path(compiled.__file__).parents[1], package)
+    for package in (Path(compiled.__file__).parents[1], Path(mumacro.__file__).parent):
+        shutil.copytree(package, tmp_path / package.name)
+    solver = tmp_path / "builder" / "solver"
     calls = "from .compiled import solver_kernel\n"
     inner = calls + "@solver_kernel\ndef inner(x):\n    return {} * x\n"
     outer = calls + "from .inner import inner\n@solver_kernel\ndef outer(x):\n    return inner(x)\n"
-    (package / "solver" / "outer.py").write_text(outer)
-    store = tmp_path / "store"
+    (solver / "inner.py").write_text(inner.format(2))
+    (solver / "outer.py").write_text(outer)
 
-    def result(factor: int) -> tuple[float, set[Path]]:
-        (package / "solver" / "inner.py").write_text(inner.format(factor))
-        script = "from builder.solver.outer import outer; print(outer(1.0))"
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(store), "PYTHONPATH": str(tmp_path)}
-        # Python takes a source of the same size and second for the one that it has compiled
-        environment["PYTHONDONTWRITEBYTECODE"] = "1"
+    def result(before: str = "") -> tuple[float, int]:
+        """What the function gives, and how many functions have been kept."""
         done = subprocess.run(
-            [sys.executable, "-c", script],
+            [
+                *(sys.executable, "-c"),
+                f"{before}\nfrom builder.solver.outer import outer; print(outer(1.0))",
+            ],
             cwd=tmp_path,
-            env=environment,
+            # Python takes a source of the same size and second for the one that it has compiled
+            env={
+                **os.environ,
+                "NUMBA_CACHE_DIR": str(tmp_path / "store"),
+                "PYTHONPATH": str(tmp_path),
+                "PYTHONDONTWRITEBYTECODE": "1",
+            },
             capture_output=True,
             text=True,
             check=True,
         )
-        return float(done.stdout), set(store.rglob("*.nbc"))
+        return float(done.stdout), len([*(tmp_path / "store").rglob("*.nbc")])
 
-    first, files = result(2)
-    again, files_again = result(2)
-    changed, files_after_change = result(3)
-    assert (first, again, changed) == (2.0, 2.0, 3.0)
-    assert files == files_again < files_after_change
+    value, count = result()
+    assert (value, result()) == (2.0, (2.0, count))
+    (solver / "inner.py").write_text(inner.format(3))
+    assert result() == (3.0, 2 * count)
+    for times, source in enumerate(("mumacro/folder/module.py", "mumacro/kernel/header.h"), 3):
+        (tmp_path / source).parent.mkdir(exist_ok=True)
+        (tmp_path / source).touch()
+        assert result() == (3.0, times * count)
+    assert result("import numba; numba.__version__ = '0.0.0'") == (3.0, 5 * count)
 
 
 def test_the_solver_runs_where_nothing_can_be_kept(tmp_path: Path) -> None:
