@@ -251,7 +251,7 @@ def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] |
         table.header.sep == BLANKS
         or not inputs
         or table.open
-        or table.name in text
+        or table.necessary_name in text
         or "\n\n" in text  # an empty line has no number
         or (shows_signs and not table.signs.decimal)
         or ('"' in text and not _quotes_surround_cells(text, sep))

@@ -48,7 +48,6 @@ from mumacro.inputs.workbooks import BEGIN, SEP, read_sheet
 _WORDS = {",": "comma", ";": "semicolon", "|": "bar", "\t": "tab", BLANKS: "blanks"}
 _WORDS_OF_SIGNS = {".": "point", ",": "comma"}
 _BETWEEN = re.compile(r"[,;|\s]+")  # anything that separates cells
-_OF_START = 2 * LOOKED_AT  # lines that are searched for the header, and for units below it
 _AT_ONCE = 2_000  # lines that are searched for the decimal separator at a time
 # first words of a row of statistics, in lower case
 _STATISTICS = re.compile(
@@ -160,10 +159,12 @@ class TextTable:
         self.first = 0  #: the first line that may be data; 0 while it is searched
         self.last: int | None = None  #: the last, if a person names it
         text, lines = Text(byte_pieces(self._source), dialect.encoding), list[str]()
+        # lines that are searched for the header, and for units up to the rows
+        searched = max(2 * LOOKED_AT, dialect.rows[0] if dialect.rows else 0)
         self._start = list[Piece]()  # first pieces of the text
         for piece in self._data_of(text.pieces()):
             self._start.append(piece)
-            lines += piece.text.split("\n", _OF_START)[:_OF_START]
+            lines += piece.text.split("\n", searched)[:searched]
             if len(lines) >= LOOKED_AT:
                 break
         self.encoding = text.encoding
@@ -181,7 +182,9 @@ class TextTable:
         self._may_lack_last = self.dialect.labview and self.units.names[-1:] == ["Comment"]
         # every header has this name; most lines do not, so it is searched first
         groups = column_names.required_groups
-        self.name = max((names[0] for names in groups if len(names) == 1), key=len, default="")
+        self.necessary_name = max(
+            (names[0] for names in groups if len(names) == 1), key=len, default=""
+        )
         self.repeated = set[int]()  #: lines that repeat the header or its units
         if self.dialect.units is not None:
             cells = split_header(lines[self.dialect.units], header.sep)
@@ -443,7 +446,7 @@ class TextTable:
         LabVIEW."""
         if self.dialect.labview and END_OF_HEADER in text:
             return True
-        return self.name in text and self._column_names.may_be_in(text)
+        return self.necessary_name in text and self._column_names.may_be_in(text)
 
     def _repeats_header(self, line: int, text: str) -> bool:
         """Return whether a line repeats the header.  Raise TextError if it is a different

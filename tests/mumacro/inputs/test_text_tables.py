@@ -134,6 +134,12 @@ def test_units_between_the_rows_that_are_named_are_told() -> None:
     assert "line 3: v0 is in mm/s, the rows before are in m/s" in str(refused(text, rows=(2, 4)))
 
 
+def test_units_above_the_rows_that_are_named_count_however_far_down_they_are() -> None:
+    text = "v0 [mm/s],mu_macro\n" + "1,0.2\n" * 5000 + "v0 [um/s],mu_macro\n2,0.2\n"
+    assert str(refused(text, rows=(5003, 5003))).startswith("line 5002: v0 is in um/s")
+    assert read(text, rows=(5000, 5001)).lines == [5000, 5001]
+
+
 def test_each_of_two_segments_is_read_with_its_own_units(rigs: Path) -> None:
     parts = [
         read_points(rigs / "rheometer_steps.txt", Dialect(rows=rows)).columns["v0"].tolist()
