@@ -205,6 +205,19 @@ def test_a_bundled_table_is_read_once() -> None:
     assert Surrogate.open(path).table is not Surrogate.open(path).table
 
 
+@pytest.mark.parametrize(
+    ("tolerance", "least"), [(1.0, "1e-4"), (1e-4, "1e-4"), (9.9e-5, "1e-7"), (1e-12, "1e-12")]
+)
+def test_a_tolerance_opens_the_smallest_table_that_meets_it(tolerance: float, least: str) -> None:
+    assert Surrogate.open(tolerance).id == f"mumacro-{least}"
+
+
+@pytest.mark.parametrize("tolerance", [True, 0.0, -1e-4, math.nan, 9e-13, b"1e-4"])
+def test_a_tolerance_has_bounds(tolerance: Any) -> None:
+    with refused("tolerance"):
+        Surrogate.open(tolerance)
+
+
 @pytest.mark.parametrize("threads", [0, -1, 1.0, True, "2", 100_000])
 def test_threads_have_bounds(fine: Surrogate, threads: Any) -> None:
     with refused("threads"):

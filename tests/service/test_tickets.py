@@ -52,6 +52,25 @@ def test_of_those_who_wait_the_client_with_the_fewest_slots_comes_first() -> Non
     run(main, max_computations=8)
 
 
+def test_one_client_has_half_of_the_places_in_the_queue_beside_another() -> None:
+    async def main(admission: Admission) -> None:
+        for client in "ba":
+            admission.see(client)
+        await admission.take("b", False)
+        waiting = [asyncio.create_task(admission.take(x, False)) for x in 32 * "a"]
+        await asyncio.sleep(0)
+        with pytest.raises(RequestError, match="too many requests wait"):
+            await admission.take("a", False)
+        waiting.append(asyncio.create_task(admission.take("b", False)))
+        await asyncio.sleep(0)
+        assert len(admission.queue) == 33
+        for task in waiting:
+            task.cancel()
+        await asyncio.gather(*waiting, return_exceptions=True)
+
+    run(main, max_computations=1)
+
+
 def test_a_body_that_grows_counts_once_and_one_too_many_is_counted() -> None:
     async def main(admission: Admission) -> None:
         ticket = Ticket(scope_of(admission))
@@ -87,12 +106,14 @@ def test_a_small_body_that_comes_in_pieces_is_held() -> None:
     assert held == [0, 10, 20]
 
 
+async def never() -> Message:
+    """What a client sends that waits for its answer."""
+    await asyncio.Event().wait()
+    raise AssertionError
+
+
 @pytest.mark.slow
 def test_the_time_limit_is_that_of_all_computations_of_a_request() -> None:
-    async def never() -> Message:
-        await asyncio.Event().wait()
-        raise AssertionError
-
     async def main(admission: Admission) -> None:
         ticket = Ticket(scope_of(admission))
         await ticket.run(lambda: time.sleep(1.2), 1.0, never)
@@ -106,10 +127,6 @@ def test_long_work_after_short_work_of_a_request_needs_a_slot_of_long_work(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(admissions, "WAIT_S", 0.05)
-
-    async def never() -> Message:
-        await asyncio.Event().wait()
-        raise AssertionError
 
     async def main(admission: Admission) -> None:
         ticket = Ticket(scope_of(admission))

@@ -360,10 +360,18 @@ def test_a_case_gets_one_remark(changed: dict[str, float], row: str) -> None:
     assert [one.row for one in remarks({**CASE, **changed})] == [row]
 
 
+def test_all_cases_with_a_remark_on_one_input_are_counted_by_it() -> None:
+    """Whether k itself is unusual or the length that it gives."""
+    [remark] = remarks({**CASE, "k": np.array([0.5, 1e6, 2.0, 1e13])})
+    assert (remark.field, remark.cases) == ("k", 3)
+
+
 def test_a_rigid_contact_is_told_what_it_assumes() -> None:
     [remark] = remarks({**CASE, "k": math.inf})
     assert (remark.row, remark.field) == ("k is known", "k")
     assert "1.5e+06 N/m" in remark.text
+    [largest] = remarks({**CASE, "k": math.inf, "y0": np.array([2e-6, 1e-6, 3e-6])})
+    assert "3e+06 N/m" in largest.text
 
 
 @pytest.mark.parametrize("k", [math.inf, 0.5, 1e6, 2e12])
