@@ -279,6 +279,18 @@ def test_a_small_batch_that_asks_for_much_is_computed_in_a_thread(
             assert slots.pop() == slot
 
 
+def test_a_question_is_checked_in_a_thread_with_a_slot_if_it_is_long(
+    started: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(admissions, "WAIT_S", 0.05)
+    body = orjson.dumps({"geometry": "ball", "radius": 5e-3, "E": 210e9, "nu": 0.3, "Fz": 10.0})
+    with started() as client:
+        monkeypatch.setattr(Admission, "slots", 8)  # all of them
+        for blanks, status in ((0, 200), (20_000, 503)):
+            response = client.post("/v1/stiffness", content=body + b" " * blanks)
+            assert response.status_code == status, response.text
+
+
 def test_the_last_piece_of_a_batch_is_sent_without_a_slot(
     started: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
