@@ -887,6 +887,10 @@ def test_the_service_gone_has_one_colour_and_no_number_on_a_phone(open_page: Any
         )
         page.wait_for("#solve-status", "^No answer from the service")
         assert page.texts("#main .bad") == []
+        page.run("document.querySelector('[value=any]').click();")
+        page.wait_for("#motion-status", "^No answer from the service")
+        assert page.texts("#main .bad") == []
+        assert page.text("#short") == "µ = –, no answer"
 
 
 @pytest.mark.parametrize("width", [320, 375])

@@ -232,7 +232,7 @@ const law = document.querySelector('#law');
 const boxes = [...law.querySelectorAll('.mark, .note')].map((one) =>
   [one.textContent, one.getBoundingClientRect()]);
 const found = [];
-for (const curve of law.querySelectorAll('.curve, .still'))
+for (const curve of law.querySelectorAll('.curve, .still, .rule'))
   for (let at = 0; at <= curve.getTotalLength(); at += 1) {
     const { x, y } = curve.getPointAtLength(at).matrixTransform(curve.getScreenCTM());
     for (const [words, box] of boxes)
@@ -254,7 +254,7 @@ LAWS = {
 
 
 @pytest.mark.parametrize("address", LAWS)
-@pytest.mark.parametrize("width", [375, 1280])
+@pytest.mark.parametrize("width", [375, 1280, 1920])
 def test_what_begins_at_a_border_is_named_beside_the_curve(
     open_page: Any, address: str, width: int
 ) -> None:

@@ -165,14 +165,28 @@ export function lawPanel(store, moved) {
     if (ends) range(places, ...ends, "band");
     plot.path(curve, "curve");
     for (const line of [curve, still]) plot.avoid(line);
-    for (const one of law.border) border(one);
+    avoidPoint();
     peak();
+    for (const one of law.border) border(one);
     nameStatic(places);
   }
 
+  /** Keeps names clear of the user's point and its bar. */
+  function avoidPoint() {
+    const { value, low = value, high = value } = answer.inputs[law.along] ?? {};
+    if (!(numberOf(answer.inputs[law.along]) > 0)) return;
+    const [xs, ys] = [[low, high].map((one) => at(one)), own().map((one) => plot.y(one))];
+    plot.lines.push([
+      Math.min(...xs) - NEAR,
+      Math.min(...ys) - NEAR,
+      Math.max(...xs) + NEAR,
+      Math.max(...ys) + NEAR,
+    ]);
+  }
+
   const at = (value) => plot.x(toUnit(law.along, value, unit()));
-  /** Places of a name beside an upright line, at its ends first; to the right first, or not. */
-  function beside(x, toRight) {
+  /** Places of a name to the right of an upright line, or to its left, at its ends first. */
+  function beside(x, right) {
     const { box } = plot;
     const rows = Array.from(
       { length: Math.max(Math.floor(box.height / LINE), 1) },
@@ -180,9 +194,7 @@ export function lawPanel(store, moved) {
     );
     const end = (y) => Math.min(y - box.y, box.y + box.height - y);
     const ends = rows.toSorted((a, b) => end(a) - end(b));
-    const side = (right) =>
-      ends.map((y) => ({ x: x + (right ? 4 : -4), y, anchor: right ? "start" : "end" }));
-    return [...side(toRight), ...side(!toRight)];
+    return ends.map((y) => ({ x: x + (right ? 4 : -4), y, anchor: right ? "start" : "end" }));
   }
 
   /** The line of a border, with the regime that begins at it. */
@@ -200,9 +212,9 @@ export function lawPanel(store, moved) {
     const words = slides ? "sliding all the time" : inWords("reverse_slip");
     const texts =
       law.along === "v0" && slides
-        ? [`critical speed${isPeak(x) ? " = y₀ω" : ""}`, "critical speed"]
+        ? [`critical speed${isPeak(x) ? " = y₀ω" : ""}`, "critical speed", "critical\nspeed"]
         : [arrow(`${words} from here`), arrow(words), arrow(words.replace(/ (?=\S+ \S+$)/, "\n"))];
-    plot.label(texts, beside(x, right), "mark");
+    for (const side of [right, !right]) if (plot.label(texts, beside(x, side), "mark")) return;
   }
 
   /** Whether the largest speed of the oscillation is at a place of the axis. */
@@ -217,9 +229,11 @@ export function lawPanel(store, moved) {
     if (law.border.some(({ value }) => isPeak(at(value)))) return;
     const foot = box.y + box.height;
     plot.over.append("path").attr("class", "rule").attr("d", `M${x} ${foot}v-9`);
+    plot.lines.push([x - 1, foot - 9, x + 1, foot]);
+    const spots = [...beside(x, true), ...beside(x, false)];
     plot.label(
       ["y₀ω"],
-      beside(x, true).filter(({ y }) => y > foot - 2 * LINE),
+      spots.filter(({ y }) => y > foot - 2 * LINE),
       "note",
     );
   }

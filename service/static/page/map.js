@@ -13,7 +13,7 @@ const { contours } = d3;
 const DIGITS = 27; // pixels of a number of the legend
 const DIGIT = 7; // pixels of a figure beside the line of a target
 const NEAR = 7; // pixels from the user's point, within which its own number is read
-const SLIM = 400; // pixels of a map, below which it has no axis to the right
+const SLIM = 360; // pixels of a map, below which it has no axis to the right
 const KEY = 340; // pixels of a frame, from which its key stands beside the title of its axis
 
 /** The relative deviation of an input; 0 where it has none. */
@@ -66,6 +66,15 @@ export function mapPanel(store, moved, loaded) {
       .flat()
       .map((ring) => `M${ring.map(place).join("L")}Z`)
       .join("");
+  }
+
+  /** The parts of a contour that do not go along the frame. */
+  function within({ coordinates }) {
+    const held = ([column, row]) =>
+      column > 0 && column < map.v_tilde.n && row > 0 && row < map.y_tilde.n;
+    const step = (at, i, ring) =>
+      held(at) ? `${i && held(ring[i - 1]) ? "L" : "M"}${onPlot(at).join(" ")}` : "";
+    return coordinates.flatMap((rings) => rings.flatMap((ring) => ring.map(step))).join("");
   }
 
   function paint() {
@@ -126,7 +135,7 @@ export function mapPanel(store, moved, loaded) {
     if (lined()) {
       const values = map.mu_ratio.map((one) => one * map.unit);
       const shape = contours().size([map.v_tilde.n, map.y_tilde.n]).contour(values, target);
-      plot.rimmed(outline(shape), "target");
+      plot.rimmed(within(shape), "target");
       numbered(shape);
     }
     const size = ownSizes();

@@ -305,7 +305,7 @@ export function motionPanel(store, moved, copy) {
     const whose = motion && `The number shown is that of ${names.map(shown).join(", ")}.`;
     const reason = told ? whole(`${capital(check)}. ${whose ?? ""}`) : prose(refused ?? "");
     tell("motion-status", reason, waits);
-    if (refused && told) write("short", `µ = –, ${check}`);
+    if (refused) write("short", `µ = –, ${told ? check : "no answer"}`);
   }
 
   function padded(values) {

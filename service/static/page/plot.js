@@ -310,8 +310,8 @@ export class Plot {
   }
 
   /**
-   * The first of some texts that has room at one of several places { x, y, anchor }, in the frame
-   * and clear of lines, points and other labels; none where there is no room.
+   * Writes the first of some texts that has room at one of several places { x, y, anchor }, in the
+   * frame and clear of lines, points and other labels; returns whether one has.
    */
   label(texts, places, className) {
     const { box } = this;
@@ -334,10 +334,11 @@ export class Plot {
         this.taken.push(place);
         text.attr("x", place[0] + 2).attr("y", free.y);
         text.selectAll("tspan").attr("x", place[0] + 2);
-        return;
+        return true;
       }
       text.remove();
     }
+    return false;
   }
 
   /** A thin cross at a place of the frame, or none. */
