@@ -127,8 +127,8 @@ class Rows(NamedTuple):
         for line, text in zip(self.lines, self.texts, strict=True):
             try:
                 yield split_row(text, self.sep)
-            except csv.Error as error:
-                raise TextError(f"line {line}: {error}") from None
+            except csv.Error:
+                raise _too_long(line) from None
 
     def written(self, sep: str) -> list[str]:
         """Return the rows as they are in the file.  With another separator, put cells in quotes
@@ -224,7 +224,11 @@ class TextTable:
             return max(rows[0], end + 1)
         for i in range(end, len(lines)):
             text = lines[i] if is_comment(lines[i]) else whole(lines, i)[0]
-            if self._is_plain(text) or self._what(i + 1, text) is Line.ROW:
+            try:
+                is_row = self._is_plain(text) or self._what(i + 1, text) is Line.ROW
+            except csv.Error:
+                raise _too_long(i + 1) from None
+            if is_row:
                 self.units.rows_begun = True
                 return i + 1
         return max(len(lines), end) + 1
@@ -296,10 +300,13 @@ class TextTable:
                 cells = _BETWEEN_BLANKS.findall(line) if '"' in line else line.split()
                 line = self.sep.join(cells)
             self.begun = self.begun if self.open else number
-            text = self._whole_row(line) if self.open or '"' in line else line
-            if text is None:
-                continue
-            what, row, fault = self._row(self.begun, text)
+            try:
+                text = self._whole_row(line) if self.open or '"' in line else line
+                if text is None:
+                    continue
+                what, row, fault = self._row(self.begun, text)
+            except csv.Error:
+                raise _too_long(self.begun) from None
             if what is Line.ROW:
                 self.units.rows_begun = True
                 if fault is not None:
@@ -434,9 +441,10 @@ class TextTable:
     def _may_begin_row(self, text: str) -> bool:
         """Return whether a line that begins like a comment may be a row whose first cell is a name
         such as #1, or a gap such as #NV."""
-        first, *cells = self._cells(text)
-        is_first = 0 not in self.units.inputs or first.strip().lower() in GAPS
-        return is_first and any(map(starts_as_number, cells))
+        first = _BETWEEN.split(text.strip(), maxsplit=1)[0]
+        if 0 in self.units.inputs and first.lower() not in GAPS:
+            return False
+        return any(map(starts_as_number, self._cells(text)[1:]))
 
     def _remedy_of_units(self, line: int) -> str:
         return "leave one of them out" if not self.first else self.remedy(line)
@@ -516,6 +524,12 @@ def _irregular(count: int, width: int) -> str:
     cells = "cell" if count == 1 else "cells"
     names = ": name every column, also that of the row numbers" if count == width + 1 else ""
     return f"has {count:,} {cells}, the header has {width:,}{names}"
+
+
+def _too_long(line: int) -> TextError:
+    """Return the error for a row with a cell in quotes that the reader of CSV does not take."""
+    most = f"{csv.field_size_limit():,}"
+    return TextError(f"line {line}: a cell in quotes may have up to {most} characters")
 
 
 def unclosed(line: int) -> TextError:

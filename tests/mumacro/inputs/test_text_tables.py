@@ -510,6 +510,17 @@ def test_one_line_says_where_a_table_is_wrong_and_how(
     assert all(part in message for part in parts), message
 
 
+@pytest.mark.parametrize("head", ["note,v0,mu_macro", "v0,mu_macro,note"])
+@pytest.mark.parametrize("line", ['#1,"{}",1', 'x,"{}",1', '"{}",1,2', '1,2,"{}"'])
+def test_a_cell_in_quotes_may_have_a_limited_length(head: str, line: str) -> None:
+    long = line.format("a" * 200_000)
+    for text, number in ((f"{head}\n{long}\n", 2), (f"{head}\n1,0.2,1\n{long}\n", 3)):
+        if line.startswith("#") and head.startswith("v0"):
+            assert number not in read(text + "1,0.2,1\n").lines  # it is a comment
+        else:
+            assert str(refused(text)).startswith(f"line {number}: a cell in quotes may have up to")
+
+
 def test_all_faults_are_told_by_line() -> None:
     fault = refused("v0,mu_macro\n" + "x,1\n" * 20)
     assert [one.partition(":")[0] for one in fault.faults] == [f"line {i}" for i in range(2, 22)]
