@@ -73,6 +73,14 @@ def test_the_map_is_the_surrogates(client: Any, surrogate: Surrogate, kind: Any)
         assert {*surrogate.evaluate(near, **names).regime} <= {regime}
 
 
+def test_each_map_is_kept_by_a_tag_of_its_own(client: Any) -> None:
+    addresses = ["/static/page/map.json?contact={}&direction={}".format(*kind) for kind in KINDS]
+    tags = [client.get(address).headers["etag"] for address in addresses]
+    assert len({*tags}) == len(KINDS)
+    for address, tag in zip(addresses, tags, strict=True):
+        assert client.get(address, headers={"If-None-Match": tag}).status_code == 304
+
+
 def test_there_is_no_map_of_what_is_not_modelled(client: Any, problem: Any) -> None:
     path = "/static/page/map.json"
     assert (
