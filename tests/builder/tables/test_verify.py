@@ -102,6 +102,8 @@ def test_a_sound_table_keeps_its_bounds_and_its_report_adds_up(
         assert len(part["sources"]) > 8
     names = {*QUANTITY_NAMES, "border", *(f"slopes of {name}" for name in QUANTITY_NAMES)}
     assert uncovered(report) == dict.fromkeys(names, 0)
+    for diagnosis, most in (("seam_jump", 2e-7), ("seam_slope_jump", 9e-5), ("monotony", 1e-7)):
+        assert 0.0 <= report[diagnosis] <= most
 
 
 def test_the_distribution_of_errors_is_that_of_its_points(sound: Surrogate, sweep: Sweep) -> None:
@@ -205,9 +207,7 @@ def test_a_step_at_any_seam_is_found(sound: Surrogate, beyond: Callable[..., Arr
         assert jumps(stepped, 100) > 9e-4 > 10.0 * jumps(sound, 100)
 
 
-def test_a_step_in_the_wrong_direction_is_found(sound: Surrogate) -> None:
-    assert seam_jumps(sound) <= 2e-7
-    assert monotony(sound, n=2000, lines=40) <= 1e-7
+def test_a_step_in_the_wrong_direction_is_found() -> None:
     # mu~ is too high below the border: it falls as v~ crosses the border upwards
     assert monotony(damaged("stick_slip_mid_2", 1.01), n=2000, lines=40) >= 1e-3
 
