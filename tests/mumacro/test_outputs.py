@@ -185,7 +185,7 @@ def test_limits_are_where_the_regime_changes_and_power_is_that_of_the_groups(
             for name in ("y0", "omega")
             for rest in ({}, {"k": "rigid"})
         ),
-        ({"k": "rigid"}, (0.0, 0.0, 0.0), math.nan),
+        ({"k": "rigid", "v0": 0.0}, (0.0, 0.0, 0.0), 2.0 / math.pi * 3.0 * 2e-6 * 1.3e5),
     ],
 )
 def test_nothing_sticks_without_oscillation_or_k(
@@ -194,8 +194,30 @@ def test_nothing_sticks_without_oscillation_or_k(
     answer = table.evaluate({**CASE, **change}, include="limits,power,stick_fraction")
     assert tuple(answer["limits"].values()) == limits
     assert (answer.mu_macro == 0.3) == (limits[0] == 0.3)
-    assert same(answer["power.oscillation"], power)
+    assert answer["power.oscillation"] == close(power, rel=1e-14)
     assert answer["stick_fraction"] == answer["stick_fraction_bound"] == 0.0
+
+
+@pytest.mark.parametrize("speed", [0.0, 1e-300, 1e-5, 0.1, 0.3, 0.999, 1.001, 30.0, 1e12, 1e200])
+@pytest.mark.parametrize("contact", ["spring", "ball"])
+@pytest.mark.parametrize("direction", ["across", "along"])
+def test_the_power_of_a_rigid_contact_is_that_of_its_slip_and_the_limit_of_stiff_ones(
+    table: Surrogate, direction: str, contact: str, speed: float
+) -> None:
+    peak = CASE["y0"] * CASE["omega"]
+    case = {**CASE, "v0": speed * peak, "direction": direction, "contact": contact}
+    rigid = table.evaluate({**case, "k": "rigid"}, include="power")
+    velocity = np.cos(2.0 * math.pi * (np.arange(200_000) + 0.5) / 200_000)
+    slip = np.hypot(velocity, speed) if direction == "across" else np.abs(velocity + speed)
+    force = velocity if direction == "across" else velocity + speed
+    mean = 3.0 * peak * np.mean(velocity * force / slip)
+    assert rigid["power.oscillation"] == close(mean, rel=1e-6, abs=1e-4)
+    assert rigid["power_bound.oscillation"] <= 1e-12 * rigid["power.oscillation"] + 1e-300
+    stiff = table.evaluate({**case, "k": 1e14}, include="power")
+    assert rigid["power.oscillation"] == close(stiff["power.oscillation"], rel=1e-4, abs=1e-4)
+    assert table.evaluate({**case, "k": [math.inf]}, include="power")["power"] == {
+        name: [value] for name, value in rigid["power"].items()
+    }
 
 
 # --- names ----------------------------------------------------------------------------------------

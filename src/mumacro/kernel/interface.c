@@ -64,6 +64,17 @@ MUMACRO_API int mumacro_evaluate_as(int contact, int direction, double mu0, doub
     return mu_fill(rows, source, bad == 4 && direction == MU_NORMAL ? MUMACRO_LIFT_OFF : bad, out);
 }
 
+/* The power of rigid contact: p is v~ times a function of y~/v~, or y~ times a constant. */
+static double mu_rigid_power(const mu_inputs *in, double *bound) {
+    const double fast = 1e100, steepest = 1e50, r = mu_amplitude_ratio(in);
+    const double steep = r < steepest ? r : steepest;
+    const double speed = r < steepest ? in->v0 : in->y0 * in->omega / steepest;
+    const double unit = in->mu0 * in->Fz * speed / fast;
+    const double power = unit * mu_held_value(MU_POWER, fast, fast * steep, bound);
+    *bound *= unit;
+    return power;
+}
+
 /* Where nothing oscillates there is no border and no power: 0.  Rigid contact has its border at
  * 0. */
 static void mu_cycle_of(const mu_inputs *in, mumacro_cycle *out) {
@@ -76,6 +87,7 @@ static void mu_cycle_of(const mu_inputs *in, mumacro_cycle *out) {
     }
     if (in->k == HUGE_VAL) {
         out->v0_crit = 0.0;
+        out->power = mu_rigid_power(in, &out->power_bound);
         return;
     }
     /* an amplitude that underflows no longer tells whether such a contact sticks */

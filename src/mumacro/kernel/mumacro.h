@@ -102,8 +102,8 @@ typedef struct {
 
 /* The cycle of a dimensional case: the speed at the border of continuous sliding [m/s]; the mean
  * power [W] that the shaker puts in; the share of the period during which the contact sticks [-];
- * the bounds of the last two.  Not in the table and NaN: the power of rigid contact, and v0_crit
- * and power where v~ or y~ is not finite. */
+ * the bounds of the last two.  NaN: v0_crit and power of an elastic contact where v~ or y~
+ * is not finite. */
 typedef struct {
     double v0_crit, power, power_bound, stick_fraction, stick_fraction_bound;
 } mumacro_cycle;

@@ -14,6 +14,7 @@ _LEAST, _MOST = 1e-290, 1e290  # products between these limits have all their di
 _FAST = (
     1e100  # a v~ that stands for the limit of fast sliding, where p is v~ times a function of y~/v~
 )
+_STEEPEST = 1e50  # a y0 omega / v0 that stands for v0 = 0, where p is y~ times a constant
 _DENORMAL = 1e-323  # two times the smallest double
 
 
@@ -53,22 +54,34 @@ def power(cases: Evaluated) -> Values:
 
 def _at_the_ends(cases: Evaluated, here: Any, *of_table: Any) -> tuple[Array, Array, Array, Array]:
     """Return the same powers where v~, y~ or a product may leave double range though the result
-    does not.  Products are computed as a whole.  The result is NaN where the power is 0 or does not
-    exist."""
+    does not, as for a rigid contact.  Products are computed as a whole.  The result is NaN where
+    the power is 0 or does not exist."""
     size = np.size(cases.mu_ratio)
     mu0, load, k, y0, omega, v0 = (np.broadcast_to(x, size)[here] for x in cases.columns.values())
-    v, y, number, bound, ratio, error, elastic = (
+    v, y, number, bound, ratio, error, usable, rigid = (
         np.broadcast_to(x, size)[here]
-        for x in (*of_table, cases.mu_ratio, cases.error_bound, cases.usable & cases.moving)
+        for x in (
+            *of_table,
+            cases.mu_ratio,
+            cases.error_bound,
+            cases.usable,
+            cases.rigid & cases.moving,
+        )
     )
     with np.errstate(all="ignore"):
-        fast = (v == math.inf) & elastic
-        steep = np.where(fast, _product((y0, omega), (v0,)), 1.0)
+        # without creep: v~ is infinite, and p is v~ times a function of y~/v~
+        fast = rigid | (v == math.inf) & usable
+        exists = usable | rigid
+        steep = np.where(fast, np.minimum(_product((y0, omega), (v0,)), _STEEPEST), 1.0)
         sliding = cases.tabulated.values("power", np.full(v.size, _FAST), _FAST * steep, cases.kind)
         value, value_bound = (
             np.where(
                 fast,
-                _product((mu0, load, v0, at_speed / _FAST)),
+                np.where(
+                    steep < _STEEPEST,
+                    _product((mu0, load, v0, at_speed / _FAST)),
+                    _product((mu0, load, y0, omega, at_speed / _FAST / _STEEPEST)),
+                ),
                 _product((mu0, mu0, load, load, omega, row), (k,)),
             )
             for row, at_speed in zip((number, bound), sliding[:2], strict=True)
@@ -77,7 +90,7 @@ def _at_the_ends(cases: Evaluated, here: Any, *of_table: Any) -> tuple[Array, Ar
         value_bound += np.where((y == 0.0) & (y0 > 0.0), _product((k, y0, y0, omega)), 0.0)
         value_bound += np.where((v == 0.0) & (v0 > 0.0), _product((mu0, load, v0)), 0.0)
         value, value_bound = (
-            np.where(elastic, x, math.nan) for x in (value, value_bound + _DENORMAL)
+            np.where(exists, x, math.nan) for x in (value, value_bound + _DENORMAL)
         )
         saved = _product((mu0, 1.0 - ratio, load, v0))
         # for a ratio that was rounded to the next number below 1
@@ -112,7 +125,7 @@ POWER = Output(
     {
         "power.oscillation": Member(
             "W",
-            "Mean power of the shaker, mu0 Fz l0 omega <y~ cos tau u_y>; no value where rigid",
+            "Mean power of the shaker, mu0 Fz l0 omega <y~ cos tau u_y>",
         ),
         "power.saved": Member("W", "Power that the drive saves: (mu0 - mu_macro) Fz v0"),
         "power_bound.oscillation": Member("W", "Bound of the absolute error of oscillation"),
