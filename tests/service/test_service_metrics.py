@@ -16,9 +16,8 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from mumacro import Surrogate
-from service import metrics as metrics_of
 from service.admission import threads_end
-from service.metrics import NOW
+from service.metrics import NOW, Metrics
 from tests.support.cases import CASE, Case
 
 PATH = "/v1/mu-macro"
@@ -173,7 +172,7 @@ def test_a_worker_goes_on_with_the_counts_of_an_earlier_one_of_its_number(
     monkeypatch.setenv("PROMETHEUS_MULTIPROC_DIR", str(tmp_path))
     earlier = tmp_path / f"counter_{os.getpid()}.db"
     earlier.write_bytes(b"counts")
-    metrics_of._reserve()
+    Metrics(())
     assert earlier.read_bytes() == b"counts"
     assert len([*tmp_path.iterdir()]) == 4
 

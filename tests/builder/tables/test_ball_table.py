@@ -138,9 +138,6 @@ def test_next_to_the_ridge_the_last_crossing_is_an_edge(springs: Springs) -> Non
     v = 0.3178542013643792 * np.exp(np.linspace(-2e-3, 2e-3, 41))
     few, many = (Ball(springs, n).solve(v, np.full(v.size, y)) for n in (73, 146))
     assert np.abs(few["mu_ratio"] - many["mu_ratio"]).max() <= BALL_NOISE
-    edges = Ball(springs)._edges(v, np.full(v.size, y))
-    for at in Ball(springs).crossings(v / y):
-        assert np.abs(edges * (at / y)[:, None] - 1.0).min(axis=1).max() <= 1e-12
 
 
 # --- charts ---------------------------------------------------------------------------------------
