@@ -392,6 +392,19 @@ def test_nothing_that_is_pointed_at_moves(open_page: Any, width: int, address: s
         before = page.run(place)  # at the end of a drag, the texts are those of the new case
 
 
+@pytest.mark.parametrize("width", [320, 375, 768, 1280, 1920])
+def test_other_advice_at_the_end_of_a_drag_moves_no_map(open_page: Any, width: int) -> None:
+    page = open_page(width=width, height=800)
+    place = "return document.querySelector('#map').getBoundingClientRect().y + scrollY;"
+    before = page.run(place), page.text("#advice"), page.texts("#remedies button")
+    for x, y in ((0.75, 0.4), (0.3, 0.5)):
+        page.touched("#map", x, y, click=True)
+        after = page.run(place), page.text("#advice"), page.texts("#remedies button")
+        assert after[0] == before[0], (x, y)
+        assert after[1] != before[1]
+    assert before[2] != []
+
+
 def test_a_step_of_a_drag_draws_the_point_and_its_end_the_rest(open_page: Any) -> None:
     page = open_page(width=1280, height=800)
     page.run(

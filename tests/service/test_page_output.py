@@ -227,6 +227,22 @@ def test_inputs_that_reach_a_target_are_offered_where_one_cannot(open_page: Any)
     assert page.value("#unknown") == "y0"
 
 
+def test_a_target_follows_a_drag_and_others_are_asked_for_at_its_end(open_page: Any) -> None:
+    with open_page.faked(RECORDED, "#side=target&target=0.05&unknown=f") as page:
+        page.until(lambda: page.texts("[data-try]"), lambda: "no input is offered")
+        asked = "return window.asked.filter(([path]) => path === 'v1/solve-for').length;"
+        page.drag_begins("[for=field-Fz]", 0.3, 0.5)
+        page.drag_moves(6, 0)  # from where it is a drag
+        for _ in range(4):
+            before = page.run(asked)
+            page.drag_moves(6, 0)
+            page.settle()
+            assert page.run(asked) - before == 1
+        page.drag_ends()
+        assert page.run(asked) - before >= 6
+        assert page.texts("[data-try]") != []
+
+
 LABELS = """
 const law = document.querySelector('#law');
 const boxes = [...law.querySelectorAll('.mark, .note')].map((one) =>

@@ -184,7 +184,7 @@ function bars(answer) {
 
 /** `found(mark)` hears of the target that is asked for while its tab is open, else null. */
 export function sidePanel(store, moved, found) {
-  let answer, asked, solved;
+  let answer, asked, solved, unreached; // the target that no value of its input reaches
   let helpful = []; // other inputs that can reach a target which this one cannot
   const channel = new Channel(
     (body) => post("v1/solve-for", body),
@@ -192,7 +192,6 @@ export function sidePanel(store, moved, found) {
       if (JSON.stringify(body) !== asked) return; // the tab was closed
       solved = reply;
       helpful = [];
-      if (!reply.results[0].roots.length) others.push(alternatives());
       draw();
       found(markOf());
     },
@@ -288,9 +287,12 @@ export function sidePanel(store, moved, found) {
     if (!open || old) return;
     const body = question();
     const words = JSON.stringify(body);
-    if (words === asked) return;
+    if (words !== asked) channel.push(body);
     asked = words;
-    channel.push(body);
+    const none = solved && !channel.busy && !solved.results[0].roots.length;
+    if (!none || store.dragged || words === unreached) return;
+    unreached = words;
+    others.push(alternatives());
   }
   const tab = tabs("side-tabs", (side) => store.look({ side }));
 
