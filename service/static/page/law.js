@@ -210,11 +210,14 @@ export function lawPanel(store, moved) {
     const arrow = (words) => (right ? `${words} →` : `← ${words}`);
     const slides = [below, above].includes("continuous");
     const words = slides ? "sliding all the time" : inWords("reverse_slip");
-    const texts =
-      law.along === "v0" && slides
-        ? [`critical speed${isPeak(x) ? " = y₀ω" : ""}`, "critical speed", "critical\nspeed"]
-        : [arrow(`${words} from here`), arrow(words), arrow(words.replace(/ (?=\S+ \S+$)/, "\n"))];
-    for (const side of [right, !right]) if (plot.label(texts, beside(x, side), "mark")) return;
+    const critical = law.along === "v0" && slides;
+    const texts = critical
+      ? [`critical speed${isPeak(x) ? " = y₀ω" : ""}`, "critical speed", "critical\nspeed"]
+      : [arrow(`${words} from here`), arrow(words), arrow(words.replace(/ (?=\S+ \S+$)/, "\n"))];
+    // what has an arrow stands on the side that it tells of, where there is room
+    const sides = [right, !right].map((one) => beside(x, one));
+    for (const places of critical ? [sides.flat()] : sides)
+      if (plot.label(texts, places, "mark")) return;
   }
 
   /** Whether the largest speed of the oscillation is at a place of the axis. */
