@@ -89,7 +89,7 @@ export function inputsPanel(store, moved) {
         <label
           for=${`field-${name}`}
           data-dial=${movable ? name : nothing}
-          title=${`${[meaning, note].filter(Boolean).join(", ")}${movable ? `. ${HOW}` : ""}`}
+          title=${`${meaning}${movable ? `. ${HOW}` : ""}`}
         >
           <span class="symbol">${symbol}</span>
           <span class="label"

@@ -126,11 +126,11 @@ function deciding(answer, effect) {
   const first = changes.filter(([, size]) => size === most).map(([name]) => name);
   const [, ofK = 0] = changes.find(([name]) => name === "k") ?? [];
   const matters = ofK >= SLIGHT;
-  const each = first.length > 1 ? "of each " : "";
-  const k = matters && !first.includes("k") ? `, of k by ${show(ofK)} %` : "";
+  const each = first.length > 1 ? "each" : "it";
+  const k = matters && !first.includes("k") ? `, 10 % of k by ${show(ofK)} %` : "";
   return {
     row: `${first.map(symbolOf).join(" and ")} decide${first.length > 1 ? "" : "s"} most`,
-    words: `10 % more or less ${each}changes µ by ${show(most)} %${k}.`,
+    words: `10 % of ${each} changes µ by ${show(most)} %${k}.`,
     remedy: matters && numberOf(answer.inputs.k),
   };
 }
@@ -253,9 +253,11 @@ export function numberPanel(store) {
   function remedies(k) {
     if (!k) return nothing;
     const range = around(k);
-    const words = `Give k as ${range.replace("..", " to ")}`;
-    return html`<button id="give" @click=${() => store.change({ k: range })}>${words}</button>
-      <button @click=${() => store.look({ panel: "fit" })}>Fit k</button>`;
+    const words = `give ${range.replace("..", " to ")}`;
+    return html`<span class="hint">k is rarely known to 10 %:</span>
+      <button id="give" @click=${() => store.change({ k: range })}>${words}</button>
+      <span class="hint">or</span>
+      <button id="fit-k" @click=${() => store.look({ panel: "fit" })}>fit it</button>`;
   }
 
   $("number").replaceChildren(); // what stands there until the first answer

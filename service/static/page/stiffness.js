@@ -11,7 +11,7 @@ const SUCH_AS = {
   radius: "such as 5 mm",
   diameter: "such as 10 mm",
   length: "such as 10 mm",
-  E: "210 GPa",
+  E: "such as 210 GPa",
   nu: "such as 0.3",
   E2: "as body 1",
   nu2: "as body 1",
