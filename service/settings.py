@@ -157,8 +157,9 @@ class Settings(BaseSettings):
         description="addresses such as 10.0.0.1 or networks such as 10.0.0.0/8 joined by commas, "
         "or *",
     )
-    guide: DirectoryPath | None = Field(
-        default_factory=_default_guide, description="a directory with the built documentation"
+    guide: Annotated[DirectoryPath | None, BeforeValidator(lambda place: place or None)] = Field(
+        default_factory=_default_guide,
+        description="a directory with the built documentation, or empty for none",
     )
     log_level: Annotated[
         Literal["debug", "info", "warning", "error", "critical"], BeforeValidator(str.lower)

@@ -254,6 +254,15 @@ def test_a_wheel_holds_the_built_documents_where_there_are_any(
     assert settings.Settings().guide is None
 
 
+def test_an_empty_guide_is_none_and_not_the_folder_of_the_service(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from service.settings import Settings
+
+    monkeypatch.setenv("MUMACRO_GUIDE", "")
+    assert Settings().guide is None
+
+
 def test_numbers_and_addresses_without_a_browser(
     client: Any, repository: Path, tmp_path: Path
 ) -> None:

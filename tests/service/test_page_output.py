@@ -162,7 +162,7 @@ def test_what_decides_most_is_the_first_of_the_sensitivities(open_page: Any, add
 def test_what_is_advised_for_k_is_done_by_buttons(open_page: Any) -> None:
     page = open_page()
     give, fit = page.texts("#remedies button")
-    assert (give, fit) == ("give 0.9 to 1.1 N/µm", "fit it")
+    assert (give, fit) == ("give k as 0.9 to 1.1 N/µm", "fit it")
     page.click("#remedies button:last-child")
     assert page.find("#part-fit").is_displayed()
     page.click("#give")

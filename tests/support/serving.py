@@ -134,8 +134,9 @@ def serving(
     before: Sequence[str] = (),
     **environment: str,
 ) -> Iterator[Server]:
-    """A service until the context ends; ``before`` stands before its command, as ``taskset``
-    does."""
+    """A service until the context ends, without the guide, which a checkout may have or not;
+    ``before`` stands before its command, as ``taskset`` does."""
+    environment = {"MUMACRO_GUIDE": "", **environment}
     command = [
         *before,
         sys.executable,

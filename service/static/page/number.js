@@ -253,8 +253,8 @@ export function numberPanel(store) {
   function remedies(k) {
     if (!k) return nothing;
     const range = around(k);
-    const words = `give ${range.replace("..", " to ")}`;
-    return html`<span class="hint">k is rarely known to 10 %:</span>
+    const words = `give k as ${range.replace("..", " to ")}`;
+    return html`<span class="hint aside">k is rarely known to 10 %:</span>
       <button id="give" @click=${() => store.change({ k: range })}>${words}</button>
       <span class="hint">or</span>
       <button id="fit-k" @click=${() => store.look({ panel: "fit" })}>fit it</button>`;
