@@ -164,18 +164,17 @@ def test_a_law_is_the_librarys(client: Any, surrogate: Surrogate, case: Any) -> 
 
 @pytest.mark.parametrize("k", [1e6, "rigid"])  # a rigid contact has no power of the shaker
 def test_the_table_for_spreadsheets_is_the_law(client: Any, k: Any) -> None:
-    law = answered(client, "law", LAW, k=k, y0=1e-5, include=["power"])
-    assert (None in law["power"]["oscillation"]) is (k == "rigid")
-    response = client.get("/v1/law.csv", params={**LAW, "k": k, "y0": 1e-5, "include": "power"})
+    law = answered(client, "law", LAW, k=k, y0=1e-5, include=["groups"])
+    assert (None in law["groups"]["v_tilde"]) is (k == "rigid")
+    response = client.get("/v1/law.csv", params={**LAW, "k": k, "y0": 1e-5, "include": "groups"})
     assert response.headers["content-type"].startswith("text/csv")
     assert 'filename="friction-law-v0.csv"' in response.headers["content-disposition"]
     columns = {
         "v0 [m/s]": law["values"],
         **{f"{name} [-]": law[name] for name in ("mu_macro", "mu_ratio", "error_bound")},
         **{
-            f"{name}.{part} [W]": law[name][part]
-            for name in ("power", "power_bound")
-            for part in law[name]
+            f"groups.{part} [{unit}]": law["groups"][part]
+            for part, unit in {"v_tilde": "-", "y_tilde": "-", "l0": "m"}.items()
         },
         "mu_static [-]": law["mu_static"],
         "regime": law["regime"],
