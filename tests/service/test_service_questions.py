@@ -14,7 +14,7 @@ import pytest
 
 import mumacro
 from mumacro import Surrogate
-from mumacro.outputs import OUTPUTS
+from mumacro.outputs import MEMBERS, OUTPUTS
 from mumacro.stiffness import contact_of
 from tests.support.cases import Case
 from tests.support.comparing import close
@@ -164,17 +164,18 @@ def test_a_law_is_the_librarys(client: Any, surrogate: Surrogate, case: Any) -> 
 
 @pytest.mark.parametrize("k", [1e6, "rigid"])  # a rigid contact has no power of the shaker
 def test_the_table_for_spreadsheets_is_the_law(client: Any, k: Any) -> None:
-    law = answered(client, "law", LAW, k=k, y0=1e-5, include=["groups"])
-    assert (None in law["groups"]["v_tilde"]) is (k == "rigid")
-    response = client.get("/v1/law.csv", params={**LAW, "k": k, "y0": 1e-5, "include": "groups"})
+    law = answered(client, "law", LAW, k=k, y0=1e-5, include=["gradient"])
+    assert (None in law["gradient"]["k"]) is (k == "rigid")
+    response = client.get("/v1/law.csv", params={**LAW, "k": k, "y0": 1e-5, "include": "gradient"})
     assert response.headers["content-type"].startswith("text/csv")
     assert 'filename="friction-law-v0.csv"' in response.headers["content-disposition"]
     columns = {
         "v0 [m/s]": law["values"],
         **{f"{name} [-]": law[name] for name in ("mu_macro", "mu_ratio", "error_bound")},
         **{
-            f"groups.{part} [{unit}]": law["groups"][part]
-            for part, unit in {"v_tilde": "-", "y_tilde": "-", "l0": "m"}.items()
+            f"{name}.{part} [{MEMBERS[f'{name}.{part}'].unit}]": law[name][part]
+            for name in ("gradient", "gradient_bound")
+            for part in law[name]
         },
         "mu_static [-]": law["mu_static"],
         "regime": law["regime"],
