@@ -61,7 +61,7 @@ if [[ $engine == podman ]]; then
     flags+=(--format docker)   # the OCI format has no place for HEALTHCHECK
     strict+=(--read-only-tmpfs=false)
 fi
-# The build stage has a tag of its own, so that its layers are kept for the next time, once.
+# The stages have tags of their own, so that their layers are kept for the next time, once.
 build() {  # TAG, then further arguments
     local old
     old=$("$engine" image inspect --format '{{.Id}}' "$1" 2>/dev/null || true)
@@ -71,6 +71,7 @@ build() {  # TAG, then further arguments
         "$engine" rmi "$old" >/dev/null 2>&1 || true
     fi
 }
+build "$IMAGE-guide" --target guide
 build "$IMAGE-build" --target build
 build "$IMAGE"
 passed "the build, by $engine on $BASE"
