@@ -219,8 +219,7 @@ def demo() -> int:
 
 def serve(*arguments: str) -> int:
     """The page's guide is built first; only what has changed is built again."""
-    ensure("docs")
-    run("sphinx-build", "-q", "docs", "build/docs", quiet=True)
+    docs()
     os.chdir(ROOT)
     if os.name != "nt":  # the service receives the signals itself
         os.execve(PYTHON, [PYTHON, "-m", "service", *arguments], environment())  # noqa: S606

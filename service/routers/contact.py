@@ -104,7 +104,7 @@ def _fitted(
             unknowns = unknowns_beside(columns)
         account = {"read_as": points.read_as, "skipped_lines": points.skipped}
     try:
-        fit = best_fit(columns, unknowns, surrogate=table.surrogate, **words)
+        fit = best_fit(columns, unknowns, table.surrogate, **words)
     except InputError as error:
         if points is None or error.index is None:
             raise

@@ -204,7 +204,7 @@ class Surrogate:
         each; None for a contact and direction without it."""
         if not {"stick_slip", "reverse_slip"} <= self.regimes_on_map(kind).keys():
             return None
-        # v~ over y~ - v~, from the left of the map to its top
+        # v~ over y~ - v~, from the left of the map to y~ = 997, just below its top
         odds = np.geomspace(plotting.V_RANGE[0], 95.0, width)
         ray = odds / (1.0 + odds)
         y = closed_forms.reverse_slip(ray)

@@ -220,6 +220,28 @@ def test_the_power_of_a_rigid_contact_is_that_of_its_slip_and_the_limit_of_stiff
     }
 
 
+@pytest.mark.parametrize("direction", ["across", "along"])
+def test_the_power_of_a_rigid_contact_is_right_at_the_ends_of_double_range(
+    table: Surrogate, direction: str
+) -> None:
+    rng = np.random.default_rng(3)
+    ends = {"mu0": 300, "Fz": 300, "y0": 307, "omega": 307, "v0": 307}
+    exponents = {name: rng.uniform(-end, end, 4000) for name, end in ends.items()}
+    cases: dict[str, Any] = {name: 10.0**x for name, x in exponents.items()}
+    cases["v0"][::5] = 0.0
+    power = table.evaluate(cases, k=math.inf, direction=direction, include="power")
+    mean, bound = power["power.oscillation"], power["power_bound.oscillation"]
+    assert not np.isnan(mean).any()
+    assert not np.isnan(bound).any()
+    # where the drag is slow the force has the full size all the time
+    whole: Any = sum(x for name, x in exponents.items() if name != "v0") + math.log10(2.0 / math.pi)
+    slow = exponents["y0"] + exponents["omega"] - exponents["v0"] > 9.0
+    there = (slow | (cases["v0"] == 0.0)) & (np.abs(whole) < 300.0)
+    assert there.sum() > 500
+    assert np.log10(mean[there]) == close(whole[there], abs=1e-9)
+    assert (mean[slow & (whole < -330.0)] == 0.0).all()
+
+
 # --- names ----------------------------------------------------------------------------------------
 
 

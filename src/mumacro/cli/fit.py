@@ -63,7 +63,7 @@ def run(words: Sequence[str]) -> str:
     surrogate = open_table(options.table)
 
     def fitted() -> Fit:
-        return best_fit(table.columns, unknown, **kind.names, surrogate=surrogate, **case.inputs)
+        return best_fit(table.columns, unknown, surrogate, **kind.names, **case.inputs)
 
     result = fit_to(options.points, table, fitted, {})
     columns = {

@@ -79,8 +79,8 @@ def fit(
     >>> f"{result.values['k']:.2g} {result.values['mu0']:.3f}"
     '1e+06 0.300'
     """
-    words = {"contact": contact, "direction": direction}
-    result = best_fit(data, unknowns, surrogate=surrogate, **words, **fixed)
+    table = surrogate or Surrogate.open()
+    result = best_fit(data, unknowns, table, contact=contact, direction=direction, **fixed)
     for text in result.warnings:
         warnings.warn(text, stacklevel=2)
     return result
@@ -89,16 +89,16 @@ def fit(
 @np.errstate(all="ignore")
 def best_fit(
     data: Any,
-    unknowns: str | Sequence[str] | None = None,
+    unknowns: str | Sequence[str] | None,
+    table: Surrogate,
+    /,
     *,
-    contact: str = "spring",
-    direction: str = "across",
-    surrogate: Surrogate | None = None,
+    contact: str,
+    direction: str,
     **fixed: Any,
 ) -> Fit:
     """Return the result of :func:`fit`, and issue no warnings: Python has one filter of them for
     all threads."""
-    table = surrogate or Surrogate.open()
     return _Problem(data, unknowns, contact, direction, table, fixed).solve()
 
 
