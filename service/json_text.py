@@ -7,7 +7,6 @@ Infinity and integers of any size, which are refused later with their fields.
 """
 
 import json
-import re
 from collections import Counter
 from collections.abc import Mapping
 from functools import partial
@@ -22,11 +21,6 @@ from .problems import FieldFault, ProblemKind, RequestError, refuse
 _MOST_MEMBERS = 200  # largest number of members in an object of a question
 #: exceptions of the fast readers for a text that is not JSON or has another type
 NotRead = (msgspec.MsgspecError, ValueError)
-_COUNTED = 2**18  # bytes of a text that are counted at a time, so that they stay in the cache
-# Bytes of rows that are decoded at a time, about a millisecond: their objects stay in the cache,
-# and other threads run between two pieces.
-_PIECE = 2**17
-_COMMA = re.compile(rb"(?<=\})[ \t\r\n]*,")  # between two rows
 
 
 # --- a question -----------------------------------------------------------------------------------

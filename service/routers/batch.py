@@ -28,7 +28,7 @@ from . import POST_PROBLEMS, router_of
 
 router = router_of("answers")
 T = TypeVar("T")
-_PIECE = 256 * 1024  # bytes of an answer that are sent at a time
+_PIECE = 2 * 1024**2  # bytes of an answer that are sent at a time
 _READS = threading.Lock()
 # time between two checks of a waiting thread whether it must end
 _LOOK_EVERY_S = 0.05
@@ -85,7 +85,8 @@ class _Answer(Response):
             await within(patience, send(message))
             piece, following = following, await run(lambda: next(pieces, None), cost)
         if held := scope.get(TICKET):
-            held.leave()
+            held.leave()  # a slow client keeps no slot, only the bytes
+            held.hold(len(piece))
         await within(patience, send({"type": "http.response.body", "body": piece}))
 
 

@@ -291,21 +291,27 @@ def test_a_question_is_checked_in_a_thread_with_a_slot_if_it_is_long(
             assert response.status_code == status, response.text
 
 
-def test_the_last_piece_of_a_batch_is_sent_without_a_slot(
+def test_the_last_piece_of_a_batch_is_sent_without_a_slot_and_its_bytes_are_counted(
     started: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A client that reads it slowly keeps no other one from computing."""
-    slots = list[int]()
+    """A client that reads it slowly keeps no other one from computing, and cannot fill the
+    memory."""
+    used = list[tuple[int, int]]()
     with started() as client:
+        admission = client.app.state.admission
 
         async def watched(limit: int, move: Any, *kind: Any) -> Any:
-            slots.append(client.app.state.admission.slots)
+            used.append((admission.slots, admission.held_bytes))
             return await within(limit, move, *kind)
 
         monkeypatch.setattr("service.routers.batch.within", watched)
-        body = {**CASE, "v0": [0.01] * 20_000}
-        assert client.post("/v1/mu-macro/batch", json=body).status_code == 200
-    assert slots[-3:] == [1, 1, 0]
+        body = {**CASE, "v0": [0.01] * 60_000}
+        answer = client.post("/v1/mu-macro/batch", json=body)
+        assert answer.status_code == 200
+        *_, first, second, (slots, held) = used
+        assert (first, second, slots) == ((1, 0), (1, 0), 0)
+        assert 0 < held < len(answer.content) / 2
+        assert admission.held_bytes == 0
 
 
 SEARCH = {
