@@ -1,5 +1,6 @@
 """The layout of the sources: no line that ruff does not see is longer than 100 characters; tests,
-benchmarks and fuzz share tests/support and import nothing else from each other."""
+benchmarks and fuzz share tests/support and import nothing else from each other; a private name of a
+module is used there."""
 
 import ast
 from pathlib import Path
@@ -74,6 +75,31 @@ def test_benchmarks_fuzz_and_tests_share_tests_support_alone(folder: str, path: 
     assert [
         name for name in ours if not f"{name}.".startswith(tuple(f"{x}." for x in SHARED[folder]))
     ] == []
+
+
+PYTHON = [
+    path
+    for name in ("benchmarks", "builder", "docs", "examples", "fuzz", "service", "src", "tests")
+    for path in sorted((ROOT / name).rglob("*.py"))
+]
+
+
+@pytest.mark.parametrize("path", PYTHON, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_private_name_of_a_module_is_used_there(path: Path) -> None:
+    tree = ast.parse(path.read_text("utf-8"))
+    made, used = set[str](), set[str]()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name):
+            used |= {node.id} if isinstance(node.ctx, ast.Load) else set()
+    for node in tree.body:
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and not node.decorator_list:
+            made.add(node.name)
+        elif isinstance(node, (ast.Assign, ast.AnnAssign)):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names = (name for target in targets for name in ast.walk(target))
+            made |= {name.id for name in names if isinstance(name, ast.Name)}
+    private = {name for name in made if name.startswith("_") and not name.startswith("__")}
+    assert private - used <= {"_"}
 
 
 def test_no_two_modules_or_functions_of_the_library_have_one_name() -> None:

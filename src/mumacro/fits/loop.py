@@ -31,7 +31,6 @@ _SOFT = {"spring": 0.5, "ball": 1e-3}
 _NARROW = 1e-6  # chi2 is a parabola in an interval with a smaller relative width
 _ALLOWED = 200  # samples of the profile at which offset and drift are computed
 _STEPS = 30  # steps of the Gauss-Newton method, and of the search for the force at the start
-_STICKING = 0.02  # fraction of the samples that must stick, and that must slip
 # Limits above which a note is made: standard deviations, fraction of mu0 Fz, fraction of the sum of
 # squared residuals.
 _SURE, _LARGE, _EXPLAINED = 4.0, 0.02, 0.2
