@@ -118,7 +118,7 @@ def answer(
     kind = kind_of_batch(batch, kind_of(contact, direction))
     units = units_of_fields(batch.schema)
     columns = find_columns(batch.schema.names, rigid, include, kind, units=units)
-    result = answer_columns(batch, surrogate or Surrogate.open(), columns)
+    result = answer_columns(batch, surrogate or Surrogate.open(), columns, Signs())
     schema = pa.schema([*batch.schema, *answer_fields(columns.answer_names)], batch.schema.metadata)
     answers = pa.RecordBatch.from_arrays([*batch.columns, *result.columns], schema=schema)
     cells = [batch.column(columns.headings[name][0])[i].as_py() for i, name, _ in result.rejects]
@@ -265,7 +265,7 @@ def _absent(inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
 
 
 def answer_columns(
-    batch: pa.RecordBatch, surrogate: Surrogate, columns: Columns, signs: Signs | None = None
+    batch: pa.RecordBatch, surrogate: Surrogate, columns: Columns, signs: Signs
 ) -> AnswerColumns:
     """Return the answers to a batch; ``signs`` are the separators in numbers as text.
 
@@ -274,7 +274,7 @@ def answer_columns(
     if columns.words and (kind := kind_of_batch(batch, SPRING)) != columns.kind:
         kinds = " and ".join(", ".join(one.names.values()) for one in (columns.kind, kind))
         raise FilesError(f"the file holds {kinds}: it is one for a file; write a file for each")
-    signs, headings, kind = signs or Signs(None, None), columns.headings, columns.kind
+    headings, kind = columns.headings, columns.kind
     values: dict[str, Any] = {} if {"k", *ENDS} & headings.keys() else {"k": math.inf}
     inputs, faults = dict[str, Array](), dict[str, dict[int, str]]()
     for name, (head, unit) in headings.items():

@@ -214,7 +214,7 @@ class _Run:
                 self.n_rows += len(block.batch)
                 self.n_rejected += len(faults)
                 rows = ([*name, block.rows.lines[i], *reason] for i, reason in faults.items())
-                yield piece, csv_lines(rows), (file + block.share) / len(self.files)
+                yield piece, csv_lines(rows), (file + block.rows.share) / len(self.files)
         self._refuse_changed()
         self.source.describe(self.say)
 

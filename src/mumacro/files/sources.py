@@ -1,12 +1,12 @@
 """Find files of cases, and read their columns and their rows in blocks.
 
-:class:`mumacro.inputs.text_tables.TextTable` cuts a table as text into rows.  Arrow reads the
-cells: inputs as numbers, other columns as text.
+In a table as text Arrow reads a piece at once, if each of its lines is a row of numbers and texts.
+:class:`mumacro.inputs.text_tables.TextTable` accounts for the records of any other piece.
 """
 
 import functools
 import glob
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,11 +19,10 @@ import pyarrow.dataset
 from mumacro.errors import TextError
 from mumacro.files.record_batch import FilesError
 from mumacro.inputs.carried import units_of_fields
-from mumacro.inputs.cells import BLANKS, GAPS, Signs, split_row
-from mumacro.inputs.decoding import Piece
+from mumacro.inputs.cells import GAPS, Signs, split_row
 from mumacro.inputs.layout import Dialect
 from mumacro.inputs.names import ColumnNames
-from mumacro.inputs.text_tables import NO_ROW, Rows, TextTable
+from mumacro.inputs.text_tables import NO_ROW, Line, Rows, TextTable, find_table
 
 #: extensions of files that can be written, and their format
 WRITTEN = {
@@ -117,8 +116,7 @@ class RowBlock(NamedTuple):
 
     batch: pa.RecordBatch  #: the rows; nulls in a row that could not be read
     rows: Rows  #: their lines in the file, or their numbers from 1 if it has no lines
-    share: float  #: fraction of the file that is read after them
-    signs: Signs | None = None  #: the separators in numbers as text
+    signs: Signs = Signs()  #: the separators in numbers as text
 
 
 class ParquetSource:
@@ -156,7 +154,7 @@ class ParquetSource:
                 numbers = range(row + 1, row + 1 + len(batch))
                 row += len(batch)
                 share = row / max(part.metadata.num_rows, 1)
-                yield RowBlock(batch, Rows(numbers), share)
+                yield RowBlock(batch, Rows(numbers, share))
         except (pa.ArrowException, OSError) as error:
             raise FilesError(f"{part.path}: damaged after row {row} ({error})") from None
 
@@ -179,10 +177,11 @@ class TextSource:
         self, files: Sequence[Path], dialect: Dialect, column_names: ColumnNames, to_text: bool
     ) -> None:
         self.files, self.tables = files, list[TextTable]()
+        #: for each file: the lines that repeat the header or its units, so far
+        self._repeated = [set[int]() for _ in files]
         for path in files:
             try:
-                table = TextTable(path, column_names, dialect)
-                table.find_signs()
+                table = find_table(path, column_names, dialect)
             except TextError as error:
                 raise FilesError(f"{path}: {error}") from None
             self.tables.append(table)
@@ -206,8 +205,8 @@ class TextSource:
     def describe(self, say: Callable[[str], None]) -> None:
         """Say how the files were read (once if all are alike), and what was left out."""
         by_form: dict[str, list[str]] = {}
-        for path, table in zip(self.files, self.tables, strict=True):
-            by_form.setdefault(table.read_as, []).append(path.name)
+        for path, table, repeated in zip(self.files, self.tables, self._repeated, strict=True):
+            by_form.setdefault(table.read_as(repeated), []).append(path.name)
         for form, names in by_form.items():
             where = "" if len(names) == len(self.tables) else f"{', '.join(names[:3])} "
             say(f"{where}read as: {form}")
@@ -221,11 +220,15 @@ class TextSource:
         numbers if all its cells in the block are plain numbers."""
         table, places = self.tables[file], [self.heads.index(name) for name in names]
         try:
-            for piece in table.pieces():
-                rows, columns = _plain_rows(piece, table) or _rows_one_by_one(piece, table)
-                if rows.texts:
-                    batch = pa.RecordBatch.from_arrays([columns[i] for i in places], [*names])
-                    yield RowBlock(batch, rows, piece.share, table.signs)
+            for rows in table.rows(lambda text: _read_at_once(text, table)):
+                self._repeated[file] |= {line for line, it in rows.skipped if it is Line.REPEATED}
+                if not rows.texts:
+                    continue
+                columns = rows.columns or _columns("\n".join(rows.texts), table)
+                if columns is None:  # all as text
+                    columns = [pa.array(cells) for cells in zip(*rows.cells(), strict=True)]
+                batch = pa.RecordBatch.from_arrays([columns[i] for i in places], [*names])
+                yield RowBlock(batch, rows, table.signs)
         except TextError as error:
             raise FilesError(f"{self.files[file]}: {error}") from None
 
@@ -241,46 +244,58 @@ def _named(heads: Sequence[str]) -> Sequence[str]:
     return [head or f"column {place}" for place, head in enumerate(heads, 1)]
 
 
-def _plain_rows(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]] | None:
-    """Return the rows in some lines, and their columns, if every line is a row that Arrow reads:
+def _read_at_once(text: str, table: TextTable) -> list[pa.Array] | None:
+    """Return the columns of some lines, inputs as doubles, if every line is a row that Arrow reads:
     each input is a number or a gap, and no line may begin like a comment or a row of statistics.
-    Return None if the lines must be examined one by one."""
-    text, sep, inputs = piece.text, table.sep, table.units.inputs
-    shows_signs = "." in text or ('"' if sep == "," else ",") in text
+
+    Return None if the lines must be examined one by one.
+    """
+    inputs = table.units.inputs
     if (
-        table.header.sep == BLANKS
-        or not inputs
-        or table.open
-        or table.necessary_name in text
+        not inputs
+        or table.column_names.may_be_in(text)
         or "\n\n" in text  # an empty line has no number
-        or (shows_signs and not table.signs.decimal)
-        or ('"' in text and not _quotes_surround_cells(text, sep))
+        or ('"' in text and not _quotes_surround_cells(text, table.sep))
     ):
         return None
-    try:
-        columns = _read(text, table, inputs)
-    except pa.ArrowInvalid:
+    columns = _columns(text, table)
+    if columns is None or _may_hold_no_row(columns):
         return None
-    lines = piece.lines
     has_number = functools.reduce(pc.or_, (pc.is_valid(columns[i]) for i in inputs))
-    if len(has_number) != len(lines) or not pc.all(has_number).as_py() or _may_hold_no_row(columns):
-        return None
-    table.units.rows_begun = True
-    return Rows(range(piece.first, piece.first + len(lines)), lines, sep), columns
+    is_plain = len(has_number) == text.count("\n") + 1 and pc.all(has_number).as_py()
+    return columns if is_plain else None
 
 
-def _rows_one_by_one(piece: Piece, table: TextTable) -> tuple[Rows, list[pa.Array]]:
-    """Return the rows in some lines, and their columns: inputs as numbers, or all as text if a cell
-    is not a plain number."""
-    rows = table.rows_in(piece)
-    table.see_signs(rows)
-    if not rows.texts:
-        return rows, []
-    text = "\n".join(rows.texts)
+def _columns(text: str, table: TextTable) -> list[pa.Array] | None:
+    """Return the columns of rows, those of inputs as doubles.
+
+    Return None if a row has another number of cells, or a cell no number, or one with so many
+    digits that it would be infinite, which must not become a rigid contact.
+    """
+    data, inputs = text.encode(), table.units.inputs
+    types = {str(i): pa.float64() if i in inputs else pa.string() for i in range(table.width)}
     try:
-        return rows, _read(text, table, table.units.inputs)
+        read = pa.csv.read_csv(
+            pa.BufferReader(data),
+            pa.csv.ReadOptions(use_threads=False, block_size=len(data) + 1, column_names=[*types]),
+            pa.csv.ParseOptions(
+                delimiter=table.sep,
+                quote_char='"' if b'"' in data else False,
+                ignore_empty_lines=False,
+                newlines_in_values=True,
+            ),
+            pa.csv.ConvertOptions(
+                check_utf8=False,
+                column_types=types,
+                null_values=_NULLS,
+                strings_can_be_null=False,
+                decimal_point=table.signs.decimal or ".",
+            ),
+        )
     except pa.ArrowInvalid:
-        return rows, _read(text, table, ())
+        return None
+    columns = [column.combine_chunks() for column in read.columns]
+    return None if any(pc.any(pc.is_inf(columns[i])).as_py() for i in inputs) else columns
 
 
 def _may_hold_no_row(columns: Iterable[pa.Array]) -> bool:
@@ -306,34 +321,3 @@ def _quotes_surround_cells(text: str, sep: str) -> bool:
     is_beside = np.isin(np.arange(256), [ord(sign) for sign in (sep, "\n", '"')])
     before, behind = is_beside[signs[quotes[::2] - 1]], is_beside[signs[quotes[1::2] + 1]]
     return quotes.size % 2 == 0 and bool(before.all() and behind.all())
-
-
-def _read(text: str, table: TextTable, inputs: Collection[int]) -> list[pa.Array]:
-    """Return the columns of rows, those of ``inputs`` as doubles.
-
-    Raise ArrowInvalid if a line has another number of cells, or a cell no number, or one with so
-    many digits that it would be infinite, which must not become a rigid contact.
-    """
-    data = text.encode()
-    types = {str(i): pa.float64() if i in inputs else pa.string() for i in range(table.width)}
-    read = pa.csv.read_csv(
-        pa.BufferReader(data),
-        pa.csv.ReadOptions(use_threads=False, block_size=len(data) + 1, column_names=[*types]),
-        pa.csv.ParseOptions(
-            delimiter=table.sep,
-            quote_char='"' if b'"' in data else False,
-            ignore_empty_lines=False,
-            newlines_in_values=True,
-        ),
-        pa.csv.ConvertOptions(
-            check_utf8=False,
-            column_types=types,
-            null_values=_NULLS,
-            strings_can_be_null=False,
-            decimal_point=table.signs.decimal or ".",
-        ),
-    )
-    columns = [column.combine_chunks() for column in read.columns]
-    if any(pc.any(pc.is_inf(columns[i])).as_py() for i in inputs):
-        raise pa.ArrowInvalid("a number is too large")
-    return columns

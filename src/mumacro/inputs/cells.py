@@ -1,5 +1,7 @@
-"""Split a line of text into cells, find the separators in the numbers of a table, and read the
-number in a cell.
+"""Make records of lines and cells of records, find the separators in the numbers of a table, and
+read the number in a cell.
+
+A record is a line, or several lines if a cell in quotes has line ends.
 
 ``1.000`` alone may be 1 or 1000.  ``0.3``, ``2.5e3``, ``1,234.5`` and ``1.234.567`` show which
 separator is which, and one such number decides for the whole table.
@@ -9,12 +11,13 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from mumacro.errors import TextError
+from mumacro.inputs.decoding import Piece
 from mumacro.inputs.fields import QUANTITY_OF, RIGID, is_rigid
 from mumacro.inputs.numbers import NUMBER, read_number, tidy
 from mumacro.inputs.units import QUANTITIES, Scale, canonical, explain_unit, scale_of
@@ -41,11 +44,67 @@ _OF_TABLE = {unit for quantity in QUANTITIES.values() for unit in quantity.units
 # cells between blanks: in quotes, or with blanks within brackets; brackets belong to the text
 # before them
 _CELL = re.compile(r'"([^"]*)"|((?:[^\s\[\]()"]|\[[^\[\]]*\]|\([^()]*\)|[\[\]()"])+)')
+# by the separator: a cell of a record with what is before it, a record, and a quoted cell that is
+# not closed, with what is before it
+_CELL_OF = {
+    sep: re.compile(rf'(\A|[{sep}])(?: *+("(?:[^"]++|"")*+") *+(?=[{sep}]|\Z)|([^{sep}]*+))')
+    for sep in ",;|\t"
+}
+_OF_RECORD = r'(?: *+"(?:[^"]++|"")*+" *+(?=[SEP\n]|\Z)|(?! *+")[^SEP\n]*+)'
+_RECORD = {
+    sep: re.compile(f"{_OF_RECORD}(?:[SEP]{_OF_RECORD})*+".replace("SEP", sep)) for sep in ",;|\t"
+}
+_UNCLOSED = {sep: re.compile(rf'[{sep}]? *+"(?:[^"]++|"")*+\Z') for sep in ",;|\t"}
 _WITH_POINTS = str.maketrans(",.", ".?")
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")
 
 
-# --- the cells of a line --------------------------------------------------------------------------
+# --- records and their cells ----------------------------------------------------------------------
+
+
+class Record(NamedTuple):
+    """Hold a line with the lines in which its quoted cells end."""
+
+    line: int  #: where it begins
+    text: str  #: without blanks around quoted cells
+    is_open: bool = False  #: whether a quoted cell does not end in the lines that were given
+
+
+def records(piece: Piece, sep: str, is_alone: Callable[[str], bool]) -> Iterator[Record]:
+    """Yield the records of some lines, without empty ones; ``sep`` is a character.  A line for
+    which ``is_alone`` is true is one, whatever quotes it has.  Raise TextError for a quote that
+    begins a cell and does not end it.
+
+    >>> piece = Piece(1, 'a\\n5" disk, "b\\nc"\\n"d')
+    >>> [record.text for record in records(piece, ",", is_comment)]
+    ['a', '5" disk,"b\\nc"', '"d']
+    """
+    text, line, start = piece.text, piece.first, 0
+    if '"' not in text:
+        yield from (Record(i, one) for i, one in enumerate(piece.lines, line) if one)
+        return
+    while start <= len(text):
+        end = text.find("\n", start)
+        end = len(text) if end < 0 else end
+        record = text[start:end]
+        if '"' in record and not is_alone(record):
+            match = _RECORD[sep].match(text, start)
+            end = match.end() if match else start
+            if _UNCLOSED[sep].match(text, end):
+                yield Record(line, text[start:], is_open=True)
+                return
+            if not text.startswith("\n", end) and end < len(text):
+                raise unclosed(line)
+            record = _CELL_OF[sep].sub(r"\1\2\3", text[start:end])
+        if record:
+            yield Record(line, record)
+        line += record.count("\n") + 1
+        start = end + 1
+
+
+def unclosed(line: int) -> TextError:
+    """Return the error for a record with a quote that does not end its cell."""
+    return TextError(f"line {line}: a quote is not closed, or not at the end of its cell")
 
 
 def is_comment(line: str) -> bool:
@@ -76,20 +135,21 @@ def split_header(line: str, sep: str) -> list[str]:
             else:
                 cells.append(match[0].strip('"'))
         return cells
-    if '"' not in line:
-        return [cell.strip() for cell in line.split(sep)]
-    try:
-        cells = next(csv.reader([line], delimiter=sep, skipinitialspace=True), [])
-    except csv.Error:
-        return [line.strip()]
-    return [cell.strip() for cell in cells]
+    return [cell.strip() for cell in split_row(line, sep)]
 
 
 def split_row(text: str, sep: str) -> list[str]:
-    """Return the cells of a row unchanged; ``sep`` is a character."""
+    """Return the cells of a record unchanged; ``sep`` is a character.
+
+    >>> split_row('5" disk;"a ""b"";";', ";")
+    ['5" disk', 'a "b";', '']
+    """
     if '"' not in text:
         return text.split(sep)
-    return next(csv.reader(io.StringIO(text, newline="\n"), delimiter=sep), [])
+    return [
+        cell if quoted is None else quoted[1:-1].replace('""', '"')
+        for _, quoted, cell in (match.groups() for match in _CELL_OF[sep].finditer(text))
+    ]
 
 
 def joined(cells: Iterable[object], sep: str) -> str:
@@ -167,72 +227,39 @@ def evidence(cell: str) -> tuple[Decimal, bool]:
     return sign, not has_thousands or other in digits or match[3] is not None
 
 
-class Signs:
-    """Collect what the numbers of a table show about its decimal separator.
+class Signs(NamedTuple):
+    """Hold the separators in the numbers of a table."""
 
-    ``decimal`` and ``thousands`` come from the options, or are None; :attr:`decimal` stays empty
-    until a number has a separator.  If commas separate the cells, a point is the decimal separator,
-    unless another number shows that it is not.
-    """
+    decimal: str = ""  #: empty if no number has one
+    thousands: str | None = None  #: that the caller names, empty for none
+    grouped: str = ""  #: the point or comma that numbers have between thousands
 
-    def __init__(
-        self, decimal: str | None, thousands: str | None, sep: str = "", dashes: str = "--"
-    ) -> None:
-        self.decimal, self.thousands = decimal or "", thousands
-        if not decimal and thousands in (".", ","):
-            self.decimal = "," if thousands == "." else "."
-        if self.decimal and self.decimal == thousands:
-            options = f"{dashes}decimal and {dashes}thousands"
-            raise TextError(f"{options} are both {thousands!r}; give one of them")
-        self._sep, self._dashes = sep, dashes
-        self.grouped = ""  #: the thousands separator, when a number has shown it
-        self._cells: dict[tuple[Decimal, bool], Cell] = {}
+    def shown_by(self, cells: Iterable[Cell], sep: str, dashes: str) -> "Signs":
+        """Return also what numbers show: the decimal separator, unless it is known, and the one
+        between thousands.  If commas separate the cells, a point is the decimal separator, unless
+        another number shows that it is not.
 
-    def see(self, cells: Iterable[Cell]) -> None:
-        """Look at numbers to learn their separators.
-
-        Raise TextError if they contradict each other, or if they can be read in two ways.
+        Raise TextError if numbers contradict each other, or can all be read in two ways;
+        ``dashes`` are before the name of an option.
         """
-        cells_by_sign = self._cells
+        cells_by_sign: dict[tuple[Decimal, bool], Cell] = {}
         for cell in cells:
             if "." in cell.text or "," in cell.text:
                 sign, sure = evidence(cell.text)
                 sure = sure or self.thousands is not None  # which is neither of the two here
                 if sign:
                     cells_by_sign.setdefault((sign, sure), cell)
-        if not self.decimal:
+        decimal = self.decimal
+        if not decimal and cells_by_sign:
             surely = [sign for sign in (".", ",") if (sign, True) in cells_by_sign]
             if len(surely) == 2:
-                raise self._contradiction(cells_by_sign[".", True], cells_by_sign[",", True])
-            if not surely and self._sep == "," and (".", False) in cells_by_sign:
-                surely = ["."]
-            if not surely and cells_by_sign:
-                raise self._ambiguity(*cells_by_sign.values())
-            self.decimal = surely[0] if surely else ""
-        other: Decimal = "," if self.decimal == "." else "."
-        if self.decimal and (other, False) in cells_by_sign:
-            self.grouped = other
-
-    def _contradiction(self, point: Cell, comma: Cell) -> TextError:
-        first, second = sorted((point, comma))
-        words = {point: "a decimal point", comma: "a decimal comma"}
-        return TextError(
-            f"line {first.line}: {first.name} {first.text.strip()[:40]!r} has {words[first]}, line "
-            f"{second.line}: {second.name} {second.text.strip()[:40]!r} {words[second]}: write "
-            f"them alike, or give {self._dashes}decimal"
-        )
-
-    def _ambiguity(self, cell: Cell, *_rest: Cell) -> TextError:
-        sign, _ = evidence(cell.text)
-        other = "," if sign == "." else "."
-        match = _NUMERAL.search(cell.text)
-        digits = match[0] if match else cell.text
-        part, whole = f"{float(digits.replace(sign, '.')):g}", digits.replace(sign, "")
-        option = f"{self._dashes}decimal"
-        return TextError(
-            f"line {cell.line}: {cell.name} {cell.text.strip()[:40]!r} may be {part} or {whole}: "
-            f"give {option} {sign} ({part}) or {option} {other} ({whole})"
-        )
+                raise _contradiction(cells_by_sign[".", True], cells_by_sign[",", True], dashes)
+            if not surely and not (sep == "," and (".", False) in cells_by_sign):
+                raise _ambiguity(next(iter(cells_by_sign.values())), dashes)
+            decimal = surely[0] if surely else "."
+        other: Decimal = "," if decimal == "." else "."
+        grouped = other if decimal and (other, False) in cells_by_sign else ""
+        return self._replace(decimal=decimal, grouped=grouped)
 
     def check(self, text: str) -> None:
         """Raise ValueError if a cell has a separator that is neither the chosen thousands separator
@@ -247,6 +274,31 @@ class Signs:
                 )
 
 
+def _contradiction(point: Cell, comma: Cell, dashes: str) -> TextError:
+    """Return the error for two numbers with different decimal separators."""
+    first, second = sorted((point, comma))
+    words = {point: "a decimal point", comma: "a decimal comma"}
+    return TextError(
+        f"line {first.line}: {first.name} {first.text.strip()[:40]!r} has {words[first]}, line "
+        f"{second.line}: {second.name} {second.text.strip()[:40]!r} {words[second]}: write "
+        f"them alike, or give {dashes}decimal"
+    )
+
+
+def _ambiguity(cell: Cell, dashes: str) -> TextError:
+    """Return the error for a number that can be read in two ways."""
+    sign, _ = evidence(cell.text)
+    other = "," if sign == "." else "."
+    match = _NUMERAL.search(cell.text)
+    digits = match[0] if match else cell.text
+    part, whole = f"{float(digits.replace(sign, '.')):g}", digits.replace(sign, "")
+    option = f"{dashes}decimal"
+    return TextError(
+        f"line {cell.line}: {cell.name} {cell.text.strip()[:40]!r} may be {part} or {whole}: "
+        f"give {option} {sign} ({part}) or {option} {other} ({whole})"
+    )
+
+
 # --- the number in a cell -------------------------------------------------------------------------
 
 
@@ -256,7 +308,7 @@ def read_cell(name: str, cell: str, signs: Signs, scale: Scale = Scale()) -> flo
     ``name`` is the input whose units the column has, ``scale`` the scale of its unit.  Raise
     ValueError with the fault.
 
-    >>> german = Signs(",", None)
+    >>> german = Signs(",")
     >>> read_cell("v0", "1.000,5", german), read_cell("k", "Rigid", german)
     (1000.5, inf)
     >>> read_cell("v0", "#NV", german)
@@ -309,7 +361,7 @@ def numbers_of(
     """Return the numbers in the cells of a column in its unit (NaN for a gap), and the faults by
     the index of the cell; see :func:`read_cell`.
 
-    >>> numbers_of(["1,5", "-", "x"], "v0", Signs(",", None))
+    >>> numbers_of(["1,5", "-", "x"], "v0", Signs(","))
     (array([1.5, nan, nan]), {2: 'must be a number'})
     """
     texts = [cell or "" for cell in cells]

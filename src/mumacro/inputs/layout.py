@@ -9,6 +9,7 @@ belongs to no column, or that contradicts another one, is refused with its line.
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from itertools import islice, pairwise
 from typing import NamedTuple
 
@@ -17,12 +18,15 @@ from mumacro.inputs.cells import (
     BLANKS,
     MOST_COLUMNS,
     NO_UNIT,
+    Signs,
     is_comment,
     is_unit,
+    records,
     split_header,
     starts_as_number,
     uncommented,
 )
+from mumacro.inputs.decoding import Piece
 from mumacro.inputs.names import ColumnNames, heading, meant_by, split_unit
 from mumacro.inputs.units import Scale, scale_of, unit_of
 
@@ -49,6 +53,16 @@ class Dialect(NamedTuple):
     sheet: str | None = None  #: sheet of a workbook
     labview: bool = False  #: whether LabVIEW wrote the table
     units: int | None = None  #: index of a line of LabVIEW with the units of the columns
+
+    @property
+    def signs(self) -> Signs:
+        """Return the separators in numbers that are known.  Raise TextError if they are the
+        same."""
+        decimal, thousands = self.decimal, self.thousands
+        if decimal and decimal == thousands:
+            options = f"{self.dashes}decimal and {self.dashes}thousands"
+            raise TextError(f"{options} are both {thousands!r}; give one of them")
+        return Signs(decimal or {".": ",", ",": "."}.get(thousands or "", ""), thousands)
 
     def completed(self, lines: Sequence[str]) -> "Dialect":
         """Return also what a line ``sep=;`` or the first lines of LabVIEW say."""
@@ -128,27 +142,26 @@ def _headers_in(
         # with an odd number of quotes a cell continues in the next line
         if not column_names.may_be_in(lines[i]) and lines[i].count('"') % 2 == 0:
             continue
-        text, end = whole(lines, i)
-        bare = uncommented(text)
-        texts = [bare]
-        if bare != text and (label := _LABEL_OF_NAMES.match(bare)):  # "# columns: v0 mu_macro"
-            texts.append(bare[label.end() :])
         for sep in seps:
+            text = _record(lines, i, sep)
+            bare = uncommented(text)
+            texts = [bare]
+            if bare != text and (label := _LABEL_OF_NAMES.match(bare)):  # "# columns: v0 mu_macro"
+                texts.append(bare[label.end() :])
             for bare in texts:
                 cells = split_header(bare, sep)
                 if column_names.heads_in(cells):
-                    yield Header(i, end, sep, cells)
+                    yield Header(i, i + 1 + text.count("\n"), sep, cells)
 
 
-def whole(lines: Sequence[str], i: int) -> tuple[str, int]:
-    """Return a line with the following lines in which its quoted cells end, and the index after
-    them."""
-    text = lines[i]
-    for end in range(i + 1, min(i + 20, len(lines))):
-        if text.count('"') % 2 == 0:
-            return text, end
-        text += f"\n{lines[end]}"
-    return (text, min(i + 20, len(lines))) if text.count('"') % 2 == 0 else (lines[i], i + 1)
+def _record(lines: Sequence[str], i: int, sep: str) -> str:
+    """Return the record that begins in a line: up to 20 lines, or the line if its quotes have
+    another meaning."""
+    if '"' in lines[i] and sep != BLANKS:
+        with suppress(TextError):
+            record = next(records(Piece(i, "\n".join(lines[i : i + 20])), sep, is_comment))
+            return lines[i] if record.is_open else record.text
+    return lines[i]
 
 
 def _fits(header: Header, lines: Sequence[str], labview: bool) -> bool:
@@ -156,7 +169,7 @@ def _fits(header: Header, lines: Sequence[str], labview: bool) -> bool:
     width = len(header.cells)
     for i in range(header.end, len(lines)):
         if lines[i].strip() and not is_comment(lines[i]):
-            cells = split_header(whole(lines, i)[0], header.sep)
+            cells = split_header(_record(lines, i, header.sep), header.sep)
             return len(cells) in (width, width - labview) or not any(cells[width:] or ["x"])
     return True
 
@@ -190,6 +203,7 @@ def _likely_header(lines: Sequence[str], skip: int, seps: Sequence[str]) -> Head
 
 SI_UNIT = Scale()
 _LONGEST = 20  # characters of a unit
+_ABOVE = 4  # units may be within this number of lines above the names
 # words before the units in their row
 _LABEL = re.compile(r"(?:units?|einheit(?:en)?|unités?|[a-z]+_units)\W*", re.IGNORECASE)
 _LABEL_BEFORE = re.compile(r"(?:units?|einheit(?:en)?|unités?)\s*[:=]\s*", re.IGNORECASE)
@@ -218,14 +232,10 @@ class ColumnUnits:
     After the first row, a column without a unit is in SI.
     """
 
-    def __init__(
-        self,
-        cells: Sequence[str],
-        sep: str,
-        input_of: Mapping[str, str],
-        remedy: Callable[[int], str],
-    ) -> None:
-        self._sep, self._input_of, self._remedy = sep, input_of, remedy
+    def __init__(self, cells: Sequence[str], sep: str, input_of: Mapping[str, str]) -> None:
+        self._sep, self._input_of = sep, input_of
+        #: after the first row: the remedy for a line that contradicts the units
+        self.remedy: Callable[[int], str] | None = None
         self._heads = [heading(cell, input_of) for cell in cells]
         in_header = [split_unit(head) for head in self._heads]
         self.names = [name for name, _ in in_header]
@@ -235,7 +245,6 @@ class ColumnUnits:
         self._units = {i: unit for i, (_, unit) in enumerate(in_header) if unit is not None}
         self._line_of = dict[int, int]()
         self.lines = set[int]()  #: lines with units, from 1
-        self.rows_begun = False
 
     @property
     def heads(self) -> list[str]:
@@ -256,6 +265,18 @@ class ColumnUnits:
     def _scale(self, i: int, unit: str) -> Scale:
         return scale_of(self._input_of[self.names[i]], unit) or SI_UNIT
 
+    def take_above(self, lines: Sequence[str], skip: int) -> None:
+        """Take the units in the lines above the header, after the first ``skip``: a row close to
+        the header, legends, and comments of ECSV."""
+        above = [i for i in reversed(range(skip, len(lines))) if lines[i].strip()]
+        row = next((i for i in above[:_ABOVE] if self.take_row(i + 1, lines[i])), None)
+        if any("%ECSV" in lines[i][:20] for i in above):
+            self.take_ecsv(lines)
+            return
+        for i in reversed(above):
+            if i != row:
+                self.take_legend(i + 1, lines[i])
+
     def take(self, line: int, text: str) -> bool:
         """Take the units in a line, either a row of units or a legend.  Return whether the line has
         units."""
@@ -266,7 +287,7 @@ class ColumnUnits:
         legend = [*units_in_legend(text, [*self.inputs.values()])]
         for name, unit in legend:
             self._take_one(line, self.names.index(name), unit)
-        if not legend and not self.rows_begun:
+        if not legend and self.remedy is None:
             self._refuse_of_another_name(line, text)
         return bool(legend)
 
@@ -298,10 +319,10 @@ class ColumnUnits:
         if in_columns:
             cells = split_header(bare, self._sep)
         else:
-            cells = _BETWEEN_BLANKS.findall(re.sub(r"(?<=\w) ?/ ?(?=\w)", "/", bare[:10_000]))
+            cells = _BETWEEN_BLANKS.findall(re.sub(r"(?<=\w)\s?/\s?(?=\w)", "/", bare[:10_000]))
             if cells and _LABEL.fullmatch(cells[0]) and len(cells) != width:
                 cells = cells[1:]
-        units = [cell.strip(" []()'\"") for cell in cells]
+        units = [cell.strip(" \t[]()'\"") for cell in cells]
         units = ["" if _LABEL.fullmatch(unit) else unit for unit in units]
         filled = [unit for unit in units if unit not in NO_UNIT]
         known = [unit for unit in filled if is_unit(unit)]
@@ -336,9 +357,9 @@ class ColumnUnits:
                 return
             if scale_of(self._input_of[name], unit) is None:
                 raise TextError(f"line {line}: {unit[:40]!r} is no unit of {name}")
-            if (before is not None or self.rows_begun) and not self.agrees(i, unit):
+            if (before is not None or self.remedy) and not self.agrees(i, unit):
                 raise self._contradiction(line, i, unit)
-        if self.rows_begun:
+        if self.remedy:
             return
         self.lines.add(line)
         if before is None:
@@ -353,7 +374,7 @@ class ColumnUnits:
             remedy = f"write the unit behind the name, as in {name} [{unit}]"
         else:
             says = f"line {self._line_of[i]} says" if i in self._line_of else "the header says"
-            remedy = self._remedy(line)
+            remedy = self.remedy(line) if self.remedy else "leave one of them out"
         what = f"{name} is in {unit}, {says} {before or unit_of(name)}"
         return TextError(f"line {line}: {what}: {remedy}")
 

@@ -1,21 +1,22 @@
-"""Read tables as people and rigs write them, in pieces: say what each line is, and cut out the
-rows.
+"""Read tables as people and rigs write them: find the layout in the first lines, then account for
+each record.
 
 A line is before the header, the header, units, data, a comment, a ruler or empty.  Any other line
 (another header, another segment, a row of statistics) is refused with its number and with the
 option that leaves it out.
 
-A line passes these modules: :mod:`mumacro.inputs.decoding` makes lines of bytes; ``layout`` finds
-the separator, the header and the units; this module cuts out the rows; ``cells`` finds the decimal
-separator, and reads the numbers.
+A line passes these modules: :mod:`mumacro.inputs.decoding` makes lines of bytes; ``cells`` makes
+records of lines; ``layout`` finds the separator, the header and the units; this module says what
+each record is; ``cells`` finds the decimal separator, and reads the numbers.
 """
 
-import csv
 import enum
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from mumacro.errors import TextError
 from mumacro.inputs.cells import (
@@ -24,13 +25,16 @@ from mumacro.inputs.cells import (
     GAPS,
     MOST_COLUMNS,
     Cell,
+    Record,
     Signs,
     is_comment,
     joined,
     may_be_value,
+    records,
     split_header,
     split_row,
     starts_as_number,
+    unclosed,
     uncommented,
 )
 from mumacro.inputs.decoding import LONGEST, NAMES, Piece, Text, byte_pieces
@@ -39,8 +43,8 @@ from mumacro.inputs.layout import (
     LOOKED_AT,
     ColumnUnits,
     Dialect,
+    Header,
     find_header,
-    whole,
 )
 from mumacro.inputs.names import ColumnNames
 from mumacro.inputs.workbooks import BEGIN, SEP, read_sheet
@@ -48,7 +52,6 @@ from mumacro.inputs.workbooks import BEGIN, SEP, read_sheet
 _WORDS = {",": "comma", ";": "semicolon", "|": "bar", "\t": "tab", BLANKS: "blanks"}
 _WORDS_OF_SIGNS = {".": "point", ",": "comma"}
 _BETWEEN = re.compile(r"[,;|\s]+")  # anything that separates cells
-_AT_ONCE = 2_000  # lines that are searched for the decimal separator at a time
 # first words of a row of statistics, in lower case
 _STATISTICS = re.compile(
     r"(?:mean|average|avg|median|mittel(?:wert)?|mw|moyenne|min(?:imum)?|max(?:imum)?|sum|total"
@@ -62,20 +65,8 @@ NO_ROW = rf"^\s*(?:{'|'.join(map(re.escape, COMMENT))}|{_STATISTICS.pattern}$)"
 _DIGITS = frozenset("0123456789")
 # a line drawn between rows has only these characters, some of them together
 _OF_RULER, _RULER = "-=_+|: \t,;", re.compile(r"-{4}|={3}|\+-{2}|\|:?-{3}")
-_ABOVE = 4  # units may be within this number of lines above the names
 _EXCERPT = 500  # characters that are kept of a refused row
 _BETWEEN_BLANKS = re.compile(r'"[^"]*"|\S+')
-# by the separator: a quoted cell after blanks, any quoted cell, and a quote that begins a cell
-_BEHIND_BLANKS, _QUOTED, _OPEN_QUOTE = (
-    {sep: re.compile(pattern.replace("SEP", re.escape(sep))) for sep in ",;|\t"}
-    for pattern in (
-        r'(?<![^SEP\n]) ++("(?:[^"]++|"")*+"(?=SEP|\n|\Z))',
-        r'"(?<![^SEP\n]")(?:[^"]++|"")*+"(?=SEP|\n|\Z)',
-        r'(?<![^SEP\n]) *+"',
-    )
-)
-_CLOSING = re.compile(r'(?:[^"]++|"")*+"')  # the rest of a quoted cell
-_UNCLOSED = re.compile(r' *+"(?:[^"]++|"")*+\Z')
 
 
 class Most(NamedTuple):
@@ -106,29 +97,34 @@ class Most(NamedTuple):
 
 
 class Line(enum.Enum):
-    """Name what a line after the header may be."""
+    """Name what a record that is no row may be."""
 
-    ROW, EMPTY, LEFT_OUT = range(3)
+    EMPTY, LEFT_OUT, REPEATED = range(3)  #: repeated is the header, or its units
+
+
+class TableRow(NamedTuple):
+    """Hold a row as text."""
+
+    text: str  #: with as many cells as the header, which are empty if there is a fault
+    fault: str = ""  #: why it does not belong to this table
 
 
 class Rows(NamedTuple):
-    """Hold rows of a table in order, as text: each has as many cells as the header."""
+    """Hold rows of a table in order."""
 
     lines: Sequence[int]  #: the line of the file in which each row begins
+    share: float = 1.0  #: fraction of the file that is read after them
     texts: list[str] = []  # noqa: RUF012 - never changed
     sep: str = ""
-    #: by the index of a row: its text, and why it does not belong to this table; its cells are
-    #: empty
+    #: by the index of a row: its text in the file, and its fault
     faults: Mapping[int, tuple[str, str]] = {}
-    skipped: Sequence[int] = ()  #: lines between them that are neither rows nor empty
+    #: lines between them that are neither rows nor empty
+    skipped: Sequence[tuple[int, Line]] = ()
+    columns: Any = None  #: if they were read at once
 
     def cells(self) -> Iterator[list[str]]:
         """Yield the cells of each row."""
-        for line, text in zip(self.lines, self.texts, strict=True):
-            try:
-                yield split_row(text, self.sep)
-            except csv.Error:
-                raise _too_long(line) from None
+        return (split_row(text, self.sep) for text in self.texts)
 
     def written(self, sep: str) -> list[str]:
         """Return the rows as they are in the file.  With another separator, put cells in quotes
@@ -136,127 +132,30 @@ class Rows(NamedTuple):
         return self.texts if sep == self.sep else [joined(cells, sep) for cells in self.cells()]
 
 
+@dataclass(frozen=True)
 class TextTable:
-    """Hold how a table in a file or in bytes is written, from its first lines, and say what each of
-    its lines is.
+    """Hold how a table in a file or in bytes is written."""
 
-    After the header come units and comments; then the rows begin.  Raise TextError if the source is
-    not a table as text, if there is no line at all, if units belong to no column or contradict each
-    other, or if there are rows before the header.  Every piece is checked before it is split.
-    """
+    source: Path | bytes
+    column_names: ColumnNames
+    dialect: Dialect
+    most: Most | None
+    encoding: str
+    sheets: str  #: what to say about the sheets of a workbook
+    header: Header
+    units: ColumnUnits
+    signs: Signs
+    sep: str  #: separator of the cells in rows, in which tabs replace blanks
+    width: int  #: the number of columns
+    first: int  #: the first line that may be data
+    last: int | None  #: the last, if a person names it
+    #: lines before it that are not empty, not the header and not units
+    skipped: Sequence[int] = ()
+    repeated: Collection[int] = ()  #: the ones of them that repeat the header
 
-    def __init__(
-        self,
-        source: Path | bytes,
-        column_names: ColumnNames,
-        dialect: Dialect,
-        most: Most | None = None,
-    ) -> None:
-        self._source, dialect, self._sheets = _sheet_in(source, column_names, dialect)
-        self._column_names, self._dashes, self._most = column_names, dialect.dashes, most
-        self.open = list[str]()  #: the lines so far of a row that goes on
-        self.begun = 0  #: the line in which it begins
-        self.first = 0  #: the first line that may be data; 0 while it is searched
-        self.last: int | None = None  #: the last, if a person names it
-        text, lines = Text(byte_pieces(self._source), dialect.encoding), list[str]()
-        # lines that are searched for the header, and for units up to the rows
-        searched = max(2 * LOOKED_AT, dialect.rows[0] if dialect.rows else 0)
-        self._start = list[Piece]()  # first pieces of the text
-        for piece in self._data_of(text.pieces()):
-            self._start.append(piece)
-            lines += piece.text.split("\n", searched)[:searched]
-            if len(lines) >= LOOKED_AT:
-                break
-        self.encoding = text.encoding
-        self.dialect = dialect.completed(lines)
-        self.header = header = find_header(lines, column_names, self.dialect)
-        while header.cells and not header.cells[-1]:
-            header.cells.pop()
-        input_of = column_names.input_of
-        self.units = ColumnUnits(header.cells, header.sep, input_of, self._remedy_of_units)
-        self.has_names = column_names.are_among(self.units.names)
-        self.width = len(self.units.names)
-        #: separator of the cells in rows, after blanks were replaced by tabs
-        self.sep = "\t" if header.sep == BLANKS else header.sep
-        # rows of LabVIEW may end before the last column
-        self._may_lack_last = self.dialect.labview and self.units.names[-1:] == ["Comment"]
-        # every header has this name; most lines do not, so it is searched first
-        groups = column_names.required_groups
-        self.necessary_name = max(
-            (names[0] for names in groups if len(names) == 1), key=len, default=""
-        )
-        self.repeated = set[int]()  #: lines that repeat the header or its units
-        if self.dialect.units is not None:
-            cells = split_header(lines[self.dialect.units], header.sep)
-            self.units.take_cells(self.dialect.units + 1, ["", *cells[1:]])
-        elif self.has_names:
-            self._take_above(lines[: header.start])
-        self.first = self._first_row(lines)
-        self.last = dialect.rows[1] if dialect.rows else None
-        #: lines before the data that are not empty, not the header and not units
-        self.skipped = [
-            i
-            for i, line in enumerate(lines[: self.first - 1], 1)
-            if line.strip() and i not in self.units.lines and not header.start < i <= header.end
-        ]
-        self.signs = Signs(self.dialect.decimal, dialect.thousands, header.sep, dialect.dashes)
-
-    def _take_above(self, lines: Sequence[str]) -> None:
-        """Take the units above the header: a row close to it, legends, and comments of ECSV."""
-        units = self.units
-        above = [i for i in reversed(range(self.dialect.skip, len(lines))) if lines[i].strip()]
-        row = next((i for i in above[:_ABOVE] if units.take_row(i + 1, lines[i])), None)
-        if any("%ECSV" in lines[i][:20] for i in above):
-            units.take_ecsv(lines)
-            return
-        for i in reversed(above):
-            if i != row:
-                units.take_legend(i + 1, lines[i])
-
-    def _first_row(self, lines: Sequence[str]) -> int:
-        """Return the line of the first row, after the units and comments below the header."""
-        rows, end = self.dialect.rows, self.header.end
-        if not self.has_names:
-            return rows[0] if rows else end + 1
-        if rows:
-            for i in range(end, min(rows[0] - 1, len(lines))):
-                self.units.take(i + 1, lines[i])
-            return max(rows[0], end + 1)
-        for i in range(end, len(lines)):
-            text = lines[i] if is_comment(lines[i]) else whole(lines, i)[0]
-            try:
-                is_row = self._is_plain(text) or self._what(i + 1, text) is Line.ROW
-            except csv.Error:
-                raise _too_long(i + 1) from None
-            if is_row:
-                self.units.rows_begun = True
-                return i + 1
-        return max(len(lines), end) + 1
-
-    def find_signs(self) -> None:
-        """Search the first pieces for the separators of numbers, some lines at a time.  Skip this
-        if columns are missing, because then that is reported."""
-        start, self._start = self._start, []
-        for piece in self._data_of(start) if self.has_names else ():
-            for part in piece.parts(_AT_ONCE):
-                if self.signs.decimal:
-                    return
-                self.see_signs(self.rows_in(part))
-
-    def see_signs(self, rows: Rows) -> None:
-        """Examine the numbers of some rows, unless they have shown their separators."""
-        if not self.signs.decimal:
-            self.signs.see(
-                Cell(line, name, cells[i])
-                for j, (line, cells) in enumerate(zip(rows.lines, rows.cells(), strict=True))
-                if j not in rows.faults
-                for i, name in self.units.inputs.items()
-            )
-
-    @property
-    def read_as(self) -> str:
-        """Return in a few words how the table was read, with the unit of each input, after it was
-        read."""
+    def read_as(self, repeated: Collection[int]) -> str:
+        """Return in a few words how the table was read, with the unit of each input.  ``repeated``
+        are the lines between rows that repeat the header or its units."""
         grouped, units = self.signs.grouped, self.units
         is_utf8 = self.encoding in ("", "utf-8", "utf-8-sig")
         words = [] if is_utf8 else [NAMES.get(self.encoding, self.encoding)]
@@ -267,205 +166,143 @@ class TextTable:
         words += [f"units in {_listed(units.lines)}"] if units.lines else []
         words += [f"rows {self.first}..{self.last}"] if self.last else []
         of_inputs = ", ".join(f"{name} [{unit}]" for name, unit in units.of_inputs().items())
-        again = f"; the header again in {_listed(self.repeated)}, left out" if self.repeated else ""
-        return f"{self._sheets}{', '.join(words)}; {of_inputs}{again}"
+        lines = {*self.repeated, *repeated}
+        again = f"; the header again in {_listed(lines)}, left out" if lines else ""
+        return f"{self.sheets}{', '.join(words)}; {of_inputs}{again}"
 
     # --- rows -------------------------------------------------------------------------------------
 
-    def pieces(self) -> Iterator[Piece]:
-        """Yield the lines from the first row on in pieces."""
-        text = Text(byte_pieces(self._source), self.dialect.encoding)
-        yield from self._data_of(text.pieces())
-        if self.open:
-            raise unclosed(self.begun)
-
-    def _data_of(self, pieces: Iterable[Piece]) -> Iterator[Piece]:
-        """Yield the lines of data."""
-        self.open = []
-        for piece in pieces:
-            if self._most is not None:
-                self._most.check(piece)
-            data = piece.between(self.first, self.last)
-            if data is not None:
-                yield data
-
-    def rows_in(self, piece: Piece) -> Rows:
-        """Return the rows in some lines, each of which is accounted for."""
-        lines, texts = list[int](), list[str]()
-        faults, skipped = dict[int, tuple[str, str]](), list[int]()
-        for number, line in enumerate(piece.lines, piece.first):
-            if not line and not self.open:  # there may be millions
+    def rows(self, columns_of: Callable[[str], Any] = lambda _text: None) -> Iterator[Rows]:
+        """Yield the rows in pieces.  Account for each record of a piece, unless ``columns_of``
+        returns its columns; then each line is a row."""
+        begun: Record | None = None
+        text = Text(byte_pieces(self.source), self.dialect.encoding)
+        for whole in text.pieces():
+            if self.most:
+                self.most.check(whole)
+            piece = self.data_in(whole)
+            if piece is None:
                 continue
-            if self.header.sep == BLANKS:
-                cells = _BETWEEN_BLANKS.findall(line) if '"' in line else line.split()
-                line = self.sep.join(cells)
-            self.begun = self.begun if self.open else number
-            try:
-                text = self._whole_row(line) if self.open or '"' in line else line
-                if text is None:
-                    continue
-                what, row, fault = self._row(self.begun, text)
-            except csv.Error:
-                raise _too_long(self.begun) from None
-            if what is Line.ROW:
-                self.units.rows_begun = True
-                if fault is not None:
+            if begun:
+                piece = Piece(begun.line, f"{begun.text}\n{piece.text}", piece.share)
+            columns = columns_of(piece.text)
+            if columns is None:
+                rows, begun = self.account_for(piece)
+            else:
+                texts = piece.lines
+                lines = range(piece.first, piece.first + len(texts))
+                rows, begun = Rows(lines, piece.share, texts, self.sep, columns=columns), None
+            if begun and len(begun.text) > LONGEST:
+                break
+            yield rows
+        if begun:
+            raise unclosed(begun.line)
+
+    def data_in(self, piece: Piece) -> Piece | None:
+        """Return the lines of data in a piece, with tabs in place of the blanks that separate
+        cells, or None if it has none."""
+        data = piece.between(self.first, self.last)
+        if data is None or self.header.sep != BLANKS:
+            return data
+        cells = (_BETWEEN_BLANKS.findall(x) if '"' in x else x.split() for x in data.lines)
+        return data._replace(text="\n".join(map("\t".join, cells)))
+
+    def account_for(self, piece: Piece) -> tuple[Rows, Record | None]:
+        """Return the rows in some lines, and the record that goes on behind them."""
+        lines, texts = list[int](), list[str]()
+        faults, skipped = dict[int, tuple[str, str]](), list[tuple[int, Line]]()
+        rows, begun = Rows(lines, piece.share, texts, self.sep, faults, skipped), None
+        for record in records(piece, self.sep, self.is_comment):
+            if record.is_open:
+                begun = record
+                break
+            what = self.account(record)
+            if isinstance(what, TableRow):
+                if what.fault:
+                    text = record.text
                     excerpt = text if len(text) <= _EXCERPT else f"{text[:_EXCERPT]}…"
-                    faults[len(texts)] = excerpt, fault
-                texts.append(row)
-                lines.append(self.begun)
+                    faults[len(texts)] = excerpt, what.fault
+                lines.append(record.line)
+                texts.append(what.text)
             elif what is not Line.EMPTY:
-                skipped.append(self.begun)
-        if sum(map(len, self.open)) > LONGEST:
-            raise unclosed(self.begun)
-        return Rows(lines, texts, self.sep, faults, skipped)
+                skipped.append((record.line, what))
+        return rows, begun
 
-    def _whole_row(self, line: str) -> str | None:
-        """Return the row that ends with a line with quotes, or None if it goes on, because a quoted
-        cell has a line end.  Raise TextError if a quote is not at the end of its cell."""
-        sep, end = self.sep, 0
-        if self.open:
-            closing = _CLOSING.match(line)
-            if closing is None:
-                self.open.append(line)
-                return None
-            end = closing.end()
-        elif is_comment(line) and not self._may_begin_row(line):
-            return line
-        rest = line[end:]
-        rest = _BEHIND_BLANKS[sep].sub(r"\1", rest) if ' "' in rest else rest
-        bare = _QUOTED[sep].sub(lambda match: "0" * len(match[0]), rest)
-        quote = _OPEN_QUOTE[sep].search(bare)
-        if (end and rest and rest[0] != sep) or (
-            quote and not _UNCLOSED.match(rest, quote.start())
-        ):
-            raise unclosed(self.begun)
-        if quote:
-            self.open.append(line[:end] + rest)
-            return None
-        row = "\n".join([*self.open, line[:end] + rest])
-        self.open = []
-        return row
+    # --- what a record is -------------------------------------------------------------------------
 
-    def _row(self, line: int, text: str) -> tuple[Line, str, str | None]:
-        """Return what a line is, and for a row its text with as many cells as the header, and its
-        fault."""
-        width, empty = self.width, self.sep * (self.width - 1)
-        if self._is_plain(text):
-            return Line.ROW, text, None
-        if text.count(self.sep) > 2 * width + 1000 and not is_comment(text):  # too long to be split
-            return Line.ROW, empty, _irregular(text.count(self.sep) + 1, width)
-        what = self._what(line, text)
-        if what is not Line.ROW:
-            return what, text, None
-        cells = split_row(text, self.sep)
-        if len(cells) == width:
-            return what, text, None
-        if len(cells) > width and not any(map(str.strip, cells[width:])):
-            return what, joined(cells[:width], self.sep), None
-        if len(cells) == width - 1 and self._may_lack_last:
-            return what, text + self.sep, None
-        return what, empty, _irregular(len(cells), width)
-
-    def _is_plain(self, text: str) -> bool:
-        """Return whether a line needs no closer look, as most rows do: all inputs begin like
-        numbers, and so does the first cell."""
-        if 0 not in self.units.inputs or '"' in text:
-            return False
-        cells = text.split(self.sep, self.width)
-        return len(cells) == self.width and all(
-            cells[i].lstrip("+-.")[:1] in _DIGITS for i in self.units.inputs
-        )
-
-    # --- other lines ------------------------------------------------------------------------------
-
-    def remedy(self, line: int) -> str:
-        """Return the remedy for a line that does not belong to the rows."""
-        if not self._dashes:
-            return "give the rows alone"
-        if self.first and line > self.first:
-            return f"{self._dashes}rows {self.first}..{line - 1} reads those before it"
-        return f"{self._dashes}rows A..B says which lines are data"
-
-    def _what(self, line: int, text: str) -> Line:
-        """Return what a line is.  Raise TextError if it has no meaning at all."""
-        if not text.strip(f" \t{self.header.sep}"):
+    def account(self, record: Record) -> TableRow | Line:
+        """Return what a record is.  Raise TextError if it has no meaning at all."""
+        line, text, _ = record
+        sep, width, inputs = self.sep, self.width, self.units.inputs
+        if 0 in inputs and '"' not in text:  # most rows need no closer look
+            cells = text.split(sep, width)
+            if len(cells) == width and all(cells[i].lstrip("+-.")[:1] in _DIGITS for i in inputs):
+                return TableRow(text)
+        if text.count(sep) > 2 * width + 1000 and not is_comment(text):  # too long to be split
+            return self._irregular(text.count(sep) + 1)
+        if not text.strip(f" \t{sep}"):
             return Line.EMPTY
-        if self._may_be_header(text) and self._repeats_header(line, text):
-            return self._again(line)
-        if is_comment(text) and not (
-            self._may_begin_row(text) and len(self._cells(text)) == self.width
-        ):
+        if self._repeats_header(line, text):
+            return Line.REPEATED
+        cells = split_row(text, sep)
+        if is_comment(text) and (len(cells) != width or self.is_comment(text)):
             if "\n" in text:
                 raise TextError(f"line {line}: a quote in a comment is not closed: leave it out")
             self.units.take(line, text)
             return Line.LEFT_OUT
         if not text.strip(_OF_RULER) and _RULER.search(text):
             return Line.LEFT_OUT
-        cells = [cell.strip() for cell in self._cells(text)]
-        first = next((cell for cell in cells if cell), "")
-        if not first:  # a blank line whose cells are in quotes
+        filled = [cell.strip() for cell in cells if cell.strip()]
+        if not filled:  # a blank line whose cells are in quotes
             return Line.EMPTY
-        if names_statistics(first):
-            what = f"{first!r} begins a row of statistics"
+        if names_statistics(filled[0]):
+            what = f"{filled[0]!r} begins a row of statistics"
             raise TextError(f"line {line}: {what}: {self.remedy(line)}")
-        filled = [cells[i] for i in self.units.inputs if i < len(cells) and cells[i]]
-        may_be_units = all(not starts_as_number(cell) or cell == "1" for cell in filled)
+        values = [cells[i].strip() for i in inputs if i < len(cells) and cells[i].strip()]
+        may_be_units = all(not starts_as_number(cell) or cell == "1" for cell in values)
         if may_be_units and self.units.take_row(line, text, is_no_row=True):
-            return self._again(line) if self.first else Line.LEFT_OUT
-        if not self._holds_values(cells, filled):
+            return Line.REPEATED
+        # a row without any value is a row with gaps if it is complete and more than a title
+        is_complete = len(cells) == width and len(filled) > 1
+        if not any(map(may_be_value, values or filled[:1])) and (values or not is_complete):
             shown = " ".join(text.split())[:60]
             remedy = self.remedy(line)
             raise TextError(f"line {line}: {shown!r} is neither a row nor a comment: {remedy}")
-        return Line.ROW
+        if len(cells) > width and not any(map(str.strip, cells[width:])):
+            return TableRow(joined(cells[:width], sep))
+        # rows of LabVIEW may end before the last column
+        if self.dialect.labview and self.units.names[len(cells) :] == ["Comment"]:
+            return TableRow(text + sep)
+        return TableRow(text) if len(cells) == width else self._irregular(len(cells))
 
-    def _again(self, line: int) -> Line:
-        """Account for a line that repeats the header or its units."""
-        self.repeated.add(line)
-        return Line.LEFT_OUT
+    def _irregular(self, count: int) -> TableRow:
+        """Return a row that has this number of cells."""
+        cells = "cell" if count == 1 else "cells"
+        names = ": name every column, also that of the row numbers"
+        fault = f"has {count:,} {cells}, the header has {self.width:,}"
+        return TableRow(self.sep * (self.width - 1), fault + names * (count == self.width + 1))
 
-    def _holds_values(self, cells: Sequence[str], filled: Sequence[str]) -> bool:
-        """Return whether some of the ``filled`` cells of inputs may be a value.  A row without any
-        value is a row with gaps if it is complete and more than a title."""
-        if filled:
-            return any(map(may_be_value, filled))
-        texts = [*filter(None, cells)]
-        return may_be_value(texts[0]) or (len(cells) == self.width and len(texts) > 1)
-
-    def _cells(self, text: str) -> list[str]:
-        """Return the cells of a line, which may still have blanks between them."""
-        if self.header.sep == BLANKS and self.sep not in text:
-            return split_header(text, BLANKS)
-        return split_row(text, self.sep)
-
-    def _may_begin_row(self, text: str) -> bool:
-        """Return whether a line that begins like a comment may be a row whose first cell is a name
-        such as #1, or a gap such as #NV."""
-        first = _BETWEEN.split(text.strip(), maxsplit=1)[0]
-        if 0 in self.units.inputs and first.lower() not in GAPS:
+    def is_comment(self, text: str) -> bool:
+        """Return whether a text is a comment, and not the beginning of a row whose first cell is a
+        name such as #1, or a gap such as #NV."""
+        if not is_comment(text):
             return False
-        return any(map(starts_as_number, self._cells(text)[1:]))
-
-    def _remedy_of_units(self, line: int) -> str:
-        return "leave one of them out" if not self.first else self.remedy(line)
-
-    def _may_be_header(self, text: str) -> bool:
-        """Return whether a text has all names that a header needs, or begins a new segment of
-        LabVIEW."""
-        if self.dialect.labview and END_OF_HEADER in text:
-            return True
-        return self.necessary_name in text and self._column_names.may_be_in(text)
+        first, *rest = split_row(text, self.sep)
+        may_begin_row = 0 not in self.units.inputs or first.strip().lower() in GAPS
+        return not (may_begin_row and any(map(starts_as_number, rest)))
 
     def _repeats_header(self, line: int, text: str) -> bool:
-        """Return whether a line repeats the header.  Raise TextError if it is a different
-        header."""
-        if text.startswith(END_OF_HEADER):
+        """Return whether a line repeats the header.  Raise TextError if it is a different header,
+        or begins a new segment of LabVIEW."""
+        if self.dialect.labview and text.startswith(END_OF_HEADER):
             raise TextError(f"line {line} begins another segment: {self.remedy(line)}")
+        if not self.column_names.may_be_in(text):
+            return False
         header, units = self.header, self.units
         cells = split_header(uncommented(text), header.sep)
         if cells[: len(header.cells)] == header.cells:
             return True
-        columns = self._column_names.heads_in(cells)[: self.width]
+        columns = self.column_names.heads_in(cells)[: self.width]
         if not columns:
             return False
         if [name for name, _ in columns] == units.names and all(
@@ -474,6 +311,112 @@ class TextTable:
             return True
         what = "is another header, with other names or units"
         raise TextError(f"line {line} {what}: {self.remedy(line)}")
+
+    def remedy(self, line: int) -> str:
+        """Return the remedy for a line that does not belong to the rows."""
+        dashes = self.dialect.dashes
+        if not dashes:
+            return "give the rows alone"
+        if self.units.remedy and line > self.first:  # the rows have begun
+            return f"{dashes}rows {self.first}..{line - 1} reads those before it"
+        return f"{dashes}rows A..B says which lines are data"
+
+
+# --- the layout -----------------------------------------------------------------------------------
+
+
+def find_table(
+    source: Path | bytes, column_names: ColumnNames, dialect: Dialect, most: Most | None = None
+) -> TextTable:
+    """Return how a table is written, from its first lines.  Every piece of it is checked before it
+    is split.
+
+    After the header come units and comments; then the rows begin.  Raise TextError if the source is
+    not a table as text, if there is no line at all, if units belong to no column or contradict each
+    other, or if there are rows before the header.
+    """
+    source, dialect, sheets = _sheet_in(source, column_names, dialect)
+    text, lines = Text(byte_pieces(source), dialect.encoding), list[str]()
+    begin, last = dialect.rows or (0, None)
+    searched = max(2 * LOOKED_AT, begin)  # lines, for the header, and for units up to the rows
+    for piece in text.pieces():
+        if most:
+            most.check(piece)
+        lines += piece.text.split("\n", searched)[:searched]
+        if len(lines) >= searched:
+            break
+    dialect = dialect.completed(lines)
+    header = find_header(lines, column_names, dialect)
+    while header.cells and not header.cells[-1]:
+        header.cells.pop()
+    units = ColumnUnits(header.cells, header.sep, column_names.input_of)
+    table = TextTable(
+        source,
+        column_names,
+        dialect,
+        most,
+        text.encoding,
+        sheets,
+        header,
+        units,
+        dialect.signs,
+        "\t" if header.sep == BLANKS else header.sep,
+        len(units.names),
+        max(begin, header.end + 1),
+        last,
+    )
+    if not column_names.are_among(units.names):  # which is reported
+        return table
+    if dialect.units is None:
+        units.take_above(lines[: header.start], dialect.skip)
+    else:
+        cells = split_header(lines[dialect.units], header.sep)
+        units.take_cells(dialect.units + 1, ["", *cells[1:]])
+    for i in range(header.end, min(table.first - 1, len(lines))):
+        units.take(i + 1, lines[i])
+    start = Piece(1, "\n".join(lines))
+    first, repeated = _first_row(table, start)
+    skipped = [
+        i
+        for i, line in enumerate(lines[: first - 1], 1)
+        if line.strip() and i not in units.lines and not header.start < i <= header.end
+    ]
+    table = replace(table, first=first, skipped=skipped, repeated=repeated - units.lines)
+    units.remedy = table.remedy
+    return replace(table, signs=_signs_in(table, start))
+
+
+def _first_row(table: TextTable, start: Piece) -> tuple[int, set[int]]:
+    """Return the line of the first row, and the lines before it that repeat the header or its
+    units.  Take the units in lines before it."""
+    data, repeated = table.data_in(start), set[int]()
+    for record in records(data, table.sep, table.is_comment) if data else ():
+        what = None if record.is_open else table.account(record)
+        if not isinstance(what, Line):
+            return record.line, repeated
+        if what is Line.REPEATED:
+            repeated.add(record.line)
+    return max(table.first, len(start.lines) + 1), repeated
+
+
+def _signs_in(table: TextTable, start: Piece) -> Signs:
+    """Return the separators in numbers, from the first lines, or else from the first rows that
+    show them."""
+    data, shown = table.data_in(start), table.signs
+    for rows in chain([table.account_for(data)[0]] if data else [], table.rows()):
+        shown = table.signs.shown_by(
+            (
+                Cell(line, name, cells[i])
+                for j, (line, cells) in enumerate(zip(rows.lines, rows.cells(), strict=True))
+                if j not in rows.faults
+                for i, name in table.units.inputs.items()
+            ),
+            table.sep,
+            table.dialect.dashes,
+        )
+        if shown.decimal:
+            break
+    return shown
 
 
 def _sheet_in(
@@ -517,21 +460,3 @@ def _listed(lines: Iterable[int]) -> str:
     numbers = sorted(lines)
     rest = f" and {len(numbers) - 5:,} more" if len(numbers) > 5 else ""
     return f"line{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers[:5]))}{rest}"
-
-
-def _irregular(count: int, width: int) -> str:
-    """Return what is wrong with a row that has this number of cells."""
-    cells = "cell" if count == 1 else "cells"
-    names = ": name every column, also that of the row numbers" if count == width + 1 else ""
-    return f"has {count:,} {cells}, the header has {width:,}{names}"
-
-
-def _too_long(line: int) -> TextError:
-    """Return the error for a row with a cell in quotes that the reader of CSV does not take."""
-    most = f"{csv.field_size_limit():,}"
-    return TextError(f"line {line}: a cell in quotes may have up to {most} characters")
-
-
-def unclosed(line: int) -> TextError:
-    """Return the error for a row with a quote that does not end its cell."""
-    return TextError(f"line {line}: a quote is not closed, or not at the end of its cell")

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from mumacro.errors import TextError
-from mumacro.inputs.cells import Cell, numbers_of
+from mumacro.inputs.cells import numbers_of
 from mumacro.inputs.layout import Dialect
 from mumacro.inputs.names import ColumnNames, absent, find_heads
-from mumacro.inputs.text_tables import Most, TextTable, names_statistics
+from mumacro.inputs.text_tables import Line, Most, TextTable, find_table, names_statistics
 from mumacro.inputs.units import checked_in_si
 from mumacro.kernel.arrays import Array
 
@@ -43,8 +43,8 @@ def read_numbers(
     >>> table.read_as
     'tab, decimal comma, header in line 3, units in line 4; v0 [mm/s], mu_macro [%]'
     """
-    table = TextTable(source, column_names, dialect, most)
-    units, signs, input_of = table.units, table.signs, column_names.input_of
+    table = find_table(source, column_names, dialect, most)
+    units, input_of = table.units, column_names.input_of
     columns, faults = find_heads(units.heads, input_of)
     missing = [
         group[0] for group in column_names.required_groups if not columns.keys() & set(group)
@@ -54,8 +54,8 @@ def read_numbers(
     if faults:
         raise TextError.of([f"line {table.header.start + 1}: {fault}" for fault in faults])
     lines, rows, wrong = list[int](), list[list[str]](), list[tuple[int, str]]()
-    skipped = table.skipped
-    for part in map(table.rows_in, table.pieces()):
+    skipped = list[tuple[int, Line]]()
+    for part in table.rows():
         skipped += part.skipped
         if len(lines) + len(part.lines) > most.rows:
             where = f"line {part.lines[most.rows - len(lines)]}"
@@ -69,15 +69,10 @@ def read_numbers(
     if not rows and not wrong:
         raise TextError(f"line {table.header.start + 1}: no row follows the names of the columns")
     _refuse_named_statistics(table, lines, rows)
-    signs.see(
-        Cell(line, name, cells[i])
-        for line, cells in zip(lines, rows, strict=True)
-        for name, (i, _) in columns.items()
-    )
     si, as_written = dict[str, Array](), dict[str, Array]()
     for name, (i, unit) in columns.items():
         texts = [cells[i] for cells in rows]
-        as_written[name], bad = numbers_of(texts, input_of[name], signs, unit.scale)
+        as_written[name], bad = numbers_of(texts, input_of[name], table.signs, unit.scale)
         si[name], too_large = checked_in_si(as_written[name], unit.scale)
         bad |= too_large
         for j in np.flatnonzero(np.isnan(si[name])).tolist():
@@ -85,7 +80,9 @@ def read_numbers(
             wrong.append((lines[j], f"line {lines[j]}: {name} {fault}"))
     if wrong:
         raise _wrong_rows(sorted(wrong, key=lambda one: one[0]), lines, dialect)
-    return TableOfNumbers(si, as_written, units.of_inputs(), lines, skipped, table.read_as)
+    read_as = table.read_as({line for line, what in skipped if what is Line.REPEATED})
+    left_out = [*table.skipped, *(line for line, _ in skipped)]
+    return TableOfNumbers(si, as_written, units.of_inputs(), lines, left_out, read_as)
 
 
 def _refuse_named_statistics(table: TextTable, lines: list[int], rows: list[list[str]]) -> None:

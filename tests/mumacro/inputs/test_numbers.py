@@ -72,9 +72,8 @@ def test_beside_a_decimal_comma_points_before_three_digits_are_not_clear(text: s
     ],
 )
 def test_the_decimal_sign_of_a_table_is_found(cells: list[str], sep: str, decimal: str) -> None:
-    signs = Signs(None, None, sep)
-    signs.see(Cell(i, "v0", cell) for i, cell in enumerate(cells, 1))
-    assert signs.decimal == decimal
+    numbers = (Cell(i, "v0", cell) for i, cell in enumerate(cells, 1))
+    assert Signs().shown_by(numbers, sep, "--").decimal == decimal
 
 
 @pytest.mark.parametrize(
@@ -87,4 +86,4 @@ def test_the_decimal_sign_of_a_table_is_found(cells: list[str], sep: str, decima
 )
 def test_a_table_whose_sign_may_be_either_says_so(cells: list[str], reason: str) -> None:
     with pytest.raises(TextError, match=reason):
-        Signs(None, None, ";").see(Cell(i, "v0", cell) for i, cell in enumerate(cells, 1))
+        Signs().shown_by((Cell(i, "v0", cell) for i, cell in enumerate(cells, 1)), ";", "--")
