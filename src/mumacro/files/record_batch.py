@@ -278,9 +278,10 @@ def answer_columns(
     values: dict[str, Any] = {} if {"k", *ENDS} & headings.keys() else {"k": math.inf}
     inputs, faults = dict[str, Array](), dict[str, dict[int, str]]()
     for name, (head, unit) in headings.items():
-        inputs[head], unread = _numbers(batch.column(head), name, signs, unit.scale)
+        inputs[head], faults[name] = _numbers(batch.column(head), name, signs, unit.scale)
+    for name, (head, unit) in headings.items():
         values[name], too_large = checked_in_si(inputs[head], unit.scale)
-        faults[name] = unread | too_large
+        faults[name] |= too_large
     if (other := kind.other_amplitude) in headings:
         if faults[other] or not np.isnan(values[other]).all():
             error = other_amplitude(other, None, kind)

@@ -119,9 +119,9 @@ class _Run:
         kind: Kind,
         say: Callable[[str], None],
     ) -> None:
-        self.files, input_format = sources.find_files(cases, say)
-        output_format, is_compressed = sources.format_of(out)
-        if not output_format or out.is_dir():
+        self.files = sources.find_files(cases, say)
+        ending = sources.ending_of(out)
+        if ending not in sources.WRITTEN or out.is_dir():
             raise FilesError(f"{out}: must be the name of a file that ends in {sources.ENDINGS}")
         self.out, self.rejects = out, out.with_name(f"{out.name}.rejects.csv")
         for output in (self.out, self.rejects):
@@ -132,12 +132,13 @@ class _Run:
         self.n_rows = self.n_rejected = 0  # so far
         self.states_at_start = [_state_of(path) for path in self.files]
         #: rows of a text are written as they were read, with the answers after them
-        self.keeps_lines = input_format == output_format == "text"
+        is_text = sources.ending_of(self.files[0]) != sources.PARQUET
+        self.keeps_lines = is_text and ending != sources.PARQUET
         folder = str(cases[0]) if len(cases) == 1 and Path(cases[0]).is_dir() else None
         self.source = (
-            ParquetSource(self.files, folder)
-            if input_format == "parquet"
-            else TextSource(self.files, dialect, names_of_columns(rigid), self.keeps_lines)
+            TextSource(self.files, dialect, names_of_columns(rigid), self.keeps_lines)
+            if is_text
+            else ParquetSource(self.files, folder)
         )
         self.surrogate, self.say, self.notes = surrogate, say, list[Note]()
         names, where = self.source.schema.names, self.source.where
@@ -146,15 +147,16 @@ class _Run:
             kind = kind if first is None else kind_of_batch(first.batch, kind, where)
         self.columns = find_columns(names, rigid, include, kind, where, self.source.units)
         headings = self.columns.headings
-        sep, decimal = written_as(
-            sources.ending_of(out), self.source.sep, self.source.decimal, dialect
-        )
+        sep, decimal = written_as(ending, self.source.sep, self.source.decimal, dialect)
         self.output = OutputFormat(
-            output_format, is_compressed, sep, decimal, headings.get("k", (None,))[0]
+            ending == sources.PARQUET,
+            out.name.lower().endswith(".gz"),
+            sep,
+            decimal,
+            headings.get("k", (None,))[0],
         )
         inputs = [heading for heading, _ in headings.values()]
         self.columns_read = [*inputs, *self.columns.words] if self.keeps_lines else names
-        is_text = input_format == "text"
         copied = [
             field.with_type(pa.float64()) if is_text and field.name in inputs else field
             for field in ([] if self.keeps_lines else self.source.schema)
@@ -203,7 +205,7 @@ class _Run:
     def _new_pieces(self) -> Iterator[tuple[Any, str, float]]:
         """Yield the pieces of the output, with the lines of rejects after each and the fraction of
         the input that was read.  The header comes first."""
-        if self.output.format == "text":
+        if not self.output.is_parquet:
             headings = [*(self.source.schema.names if self.keeps_lines else ()), *self.schema.names]
             mark = "\ufeff" if self.source.has_mark else ""
             yield self.output.pack(mark + csv_lines([headings], self.output.sep)), "", 0.0

@@ -6,7 +6,7 @@ In a table as text Arrow reads a piece at once, if each of its lines is a row of
 
 import functools
 import glob
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,55 +24,41 @@ from mumacro.inputs.layout import Dialect
 from mumacro.inputs.names import ColumnNames
 from mumacro.inputs.text_tables import NO_ROW, Line, Rows, TextTable, find_table
 
-#: extensions of files that can be written, and their format
-WRITTEN = {
-    ".csv": "text",
-    ".tsv": "text",
-    ".txt": "text",
-    ".parquet": "parquet",
-}
-#: extensions of files that can be read, and their format
-FORMATS = WRITTEN | dict.fromkeys((".lvm", ".dat", ".asc", ".prn", ".xlsx"), "text")
+PARQUET = ".parquet"
+#: extensions of files that can be written: Parquet, and text, also compressed
+WRITTEN = (".csv", ".tsv", ".txt", PARQUET)
 ENDINGS = f"{', '.join(WRITTEN)} (text also .gz)"
+_READ = (*WRITTEN, ".lvm", ".dat", ".asc", ".prn", ".xlsx")
 # extensions that only tables have; a text with another extension may be a note
-_TABLES = {".csv", ".tsv", ".parquet"}
-#: extensions of files with one JSON object per line, which are refused
-_JSON = {".ndjson", ".jsonl", ".json"}
+_TABLES = (".csv", ".tsv", PARQUET)
+_JSON = (".ndjson", ".jsonl", ".json")  # is refused
 # first letters of files that other programs leave in a folder: metadata, hidden files, Excel's lock
 _STRAY = ("_", ".", "~$")
 ROWS = 65_536  # rows of a block of Parquet, at most: a third of a second of work
 _NULLS = sorted({text for gap in GAPS for text in (gap, gap.upper(), gap.title())} | {"NaN"})
 
 
-def format_of(path: Path, formats: Mapping[str, str] = WRITTEN) -> tuple[str, bool]:
-    """Return the format by the extension of a name (empty for another extension), and whether it is
-    compressed."""
-    name = path.name.lower()
-    is_compressed = name.endswith(".gz")
-    file_format = formats.get(ending_of(path), "")
-    return "" if is_compressed and file_format == "parquet" else file_format, is_compressed
-
-
 def ending_of(path: Path) -> str:
-    """Return the extension of a name; for a compressed file the one before that of compression.
+    """Return the extension of a name; for a compressed text the one before that of compression.
 
-    >>> ending_of(Path("cases.CSV.gz"))
-    '.csv'
+    >>> ending_of(Path("cases.CSV.gz")), ending_of(Path("cases.parquet.gz"))
+    ('.csv', '.gz')
     """
-    return Path(path.name.lower().removesuffix(".gz")).suffix
+    name = Path(path.name.lower())
+    inner = Path(name.stem).suffix if name.suffix == ".gz" else ""
+    return name.suffix if inner in ("", PARQUET) else inner
 
 
 def find_files(
     cases: Sequence[str | Path], say: Callable[[str], None] = lambda _text: None
-) -> tuple[list[Path], str]:
-    """Return the files that paths, folders and patterns name, in order, and their format.
+) -> list[Path]:
+    """Return the files that paths, folders and patterns name, in order.
 
     A file that the caller names itself is read as text if its extension is unknown.  Files of other
     programs in a folder are skipped, and ``say`` is told so.  Raise FilesError if a name fits no
-    file, or if formats differ.
+    file, or if only some are Parquet.
     """
     files: list[Path] = []
-    formats: dict[str, None] = {}
     for entry in cases:
         path = Path(entry)
         if path.is_file():
@@ -80,7 +66,6 @@ def find_files(
                 remedy = "write CSV or Parquet, as pandas.read_json(..., lines=True).to_csv does"
                 raise FilesError(f"{path}: JSON is no table: {remedy}")
             files.append(path)
-            formats[format_of(path, FORMATS)[0] or "text"] = None
             continue
         pattern = f"{glob.escape(str(path))}/**/*" if path.is_dir() else str(path)
         matches = sorted(map(Path, glob.glob(pattern, recursive=True)))
@@ -92,10 +77,9 @@ def find_files(
             rest = f" and {len(strays) - 5} more" if len(strays) > 5 else ""
             say(f"{entry}: skipped {names}{rest}")
         files += tables
-        formats |= dict.fromkeys(format_of(one, FORMATS)[0] for one in tables)
-    if len(formats) > 1:
-        raise FilesError(f"the files are of several formats: {', '.join(sorted(formats))}")
-    return files, next(iter(formats))
+    if len({ending_of(one) == PARQUET for one in files}) > 1:
+        raise FilesError("the files are of several formats: parquet, text")
+    return files
 
 
 def _tables_among(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
@@ -103,7 +87,7 @@ def _tables_among(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
     usable = [
         path
         for path in paths
-        if format_of(path, FORMATS)[0]
+        if ending_of(path) in _READ
         and not path.name.startswith(_STRAY)
         and not path.name.endswith(".rejects.csv")
     ]
@@ -224,9 +208,11 @@ class TextSource:
                 self._repeated[file] |= {line for line, it in rows.skipped if it is Line.REPEATED}
                 if not rows.texts:
                     continue
-                columns = rows.columns or _columns("\n".join(rows.texts), table)
-                if columns is None:  # all as text
-                    columns = [pa.array(cells) for cells in zip(*rows.cells(), strict=True)]
+                columns = rows.columns
+                if columns is None:
+                    text = "\n".join(rows.texts)
+                    columns = _columns(text, table, table.units.inputs)
+                    columns = columns or _columns(text, table, ())
                 batch = pa.RecordBatch.from_arrays([columns[i] for i in places], [*names])
                 yield RowBlock(batch, rows, table.signs)
         except TextError as error:
@@ -258,7 +244,7 @@ def _read_at_once(text: str, table: TextTable) -> list[pa.Array] | None:
         or ('"' in text and not _quotes_surround_cells(text, table.sep))
     ):
         return None
-    columns = _columns(text, table)
+    columns = _columns(text, table, inputs)
     if columns is None or _may_hold_no_row(columns):
         return None
     has_number = functools.reduce(pc.or_, (pc.is_valid(columns[i]) for i in inputs))
@@ -266,13 +252,13 @@ def _read_at_once(text: str, table: TextTable) -> list[pa.Array] | None:
     return columns if is_plain else None
 
 
-def _columns(text: str, table: TextTable) -> list[pa.Array] | None:
-    """Return the columns of rows, those of inputs as doubles.
+def _columns(text: str, table: TextTable, inputs: Collection[int]) -> list[pa.Array] | None:
+    """Return the columns of rows, those of ``inputs`` as doubles.
 
     Return None if a row has another number of cells, or a cell no number, or one with so many
     digits that it would be infinite, which must not become a rigid contact.
     """
-    data, inputs = text.encode(), table.units.inputs
+    data = text.encode()
     types = {str(i): pa.float64() if i in inputs else pa.string() for i in range(table.width)}
     try:
         read = pa.csv.read_csv(

@@ -32,14 +32,14 @@ def written_as(ending: str, sep: str, decimal: str, dialect: Dialect) -> tuple[s
 
 
 class OutputFormat(NamedTuple):
-    """Describe how rows are written: ``text`` or ``parquet``; text piece by piece, as .gz if
+    """Describe how rows are written: as Parquet, or as text, piece by piece, as .gz if
     ``is_compressed``.
 
     ``sep`` and ``decimal`` are the separators of a table as text.  In the column ``stiffness``
     infinity is written as ``rigid``.
     """
 
-    format: str
+    is_parquet: bool
     is_compressed: bool
     sep: str
     decimal: str
@@ -54,7 +54,7 @@ class OutputFormat(NamedTuple):
     def piece(self, batch: pa.RecordBatch, lines: pa.Array | None = None) -> Any:
         """Return rows as they are written; for Parquet the batch itself.  The columns are written
         after ``lines``, if there are any."""
-        if self.format == "parquet":
+        if self.is_parquet:
             return batch
         columns = [*map(self._cells, batch.schema.names, batch.columns)]
         last = pc.binary_join_element_wise(columns.pop(), "\n", "")
@@ -90,7 +90,7 @@ class OutputFormat(NamedTuple):
     def writing(self, stream: BinaryIO, schema: pa.Schema) -> Iterator[Callable[[Any], object]]:
         """Yield the function that writes a piece.  Doubles in Parquet are written plainly, which is
         three times as fast."""
-        if self.format != "parquet":
+        if not self.is_parquet:
             yield stream.write
             return
         words = [field.name for field in schema if not pa.types.is_floating(field.type)]

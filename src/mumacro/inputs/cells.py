@@ -56,7 +56,6 @@ _RECORD = {
 }
 _UNCLOSED = {sep: re.compile(rf'[{sep}]? *+"(?:[^"]++|"")*+\Z') for sep in ",;|\t"}
 _WITH_POINTS = str.maketrans(",.", ".?")
-_FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")
 
 
 # --- records and their cells ----------------------------------------------------------------------
@@ -95,7 +94,9 @@ def records(piece: Piece, sep: str, is_alone: Callable[[str], bool]) -> Iterator
                 return
             if not text.startswith("\n", end) and end < len(text):
                 raise unclosed(line)
-            record = _CELL_OF[sep].sub(r"\1\2\3", text[start:end])
+            record = text[start:end]
+            if ' "' in record or '" ' in record:
+                record = _CELL_OF[sep].sub(r"\1\2\3", record)
         if record:
             yield Record(line, record)
         line += record.count("\n") + 1
@@ -370,7 +371,7 @@ def numbers_of(
         # if commas are decimal separators, a point is not
         plain = text.translate(_WITH_POINTS) if signs.decimal == "," else text
         try:
-            value = float(_FORTRAN.sub("e", plain) if "D" in plain or "d" in plain else plain)
+            value = float(plain)
         except ValueError:
             value = math.nan
         if math.isfinite(value) and plain.isascii() and "_" not in plain:

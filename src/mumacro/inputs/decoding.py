@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 from mumacro.errors import TextError
 
 PIECE = 4 * 2**20  #: bytes that are read at once
-_BEGIN = 2**16  # of them at the beginning, in which the layout is found
 LONGEST = 16 * 2**20  #: largest number of characters in a line
 _START = 1024  # number of bytes from which the encoding is decided
 _MARKS = (
@@ -71,12 +70,13 @@ class Piece(NamedTuple):
 
     def between(self, first: int, last: int | None) -> "Piece | None":
         """Return the lines from ``first`` to ``last``, or None if there are none."""
-        if self.first >= first and last is None:
-            return self
-        start = max(first - self.first, 0)
-        end = None if last is None else max(last - self.first + 1, 0)
-        lines = self.lines[start:end]
-        return Piece(self.first + start, "\n".join(lines), self.share) if lines else None
+        start = max(first, self.first)
+        *before, text = self.text.split("\n", start - self.first)
+        if len(before) < start - self.first or (last is not None and last < start):
+            return None
+        if last is not None:
+            text = "\n".join(text.split("\n", last - start + 1)[: last - start + 1])
+        return Piece(start, text, self.share)
 
 
 def encoding_of(name: str) -> str:
@@ -102,7 +102,7 @@ def byte_pieces(source: Path | bytes) -> Iterator[tuple[bytes, float]]:
     of the file that is read after it.  Raise TextError if a compressed file is damaged."""
     if isinstance(source, bytes) and source.startswith(_GZIP):
         raise TextError("it is compressed: unpack it first")
-    most = max(min(PIECE, _BEGIN), _START)
+    most = max(PIECE, _START)
     try:
         with io.BytesIO(source) if isinstance(source, bytes) else source.open("rb") as raw:
             size = max(raw.seek(0, io.SEEK_END), 1)

@@ -144,6 +144,8 @@ def _headers_in(
             continue
         for sep in seps:
             text = _record(lines, i, sep)
+            if sep not in text and sep != BLANKS:
+                continue
             bare = uncommented(text)
             texts = [bare]
             if bare != text and (label := _LABEL_OF_NAMES.match(bare)):  # "# columns: v0 mu_macro"
@@ -277,19 +279,18 @@ class ColumnUnits:
             if i != row:
                 self.take_legend(i + 1, lines[i])
 
-    def take(self, line: int, text: str) -> bool:
-        """Take the units in a line, either a row of units or a legend.  Return whether the line has
-        units."""
-        return self.take_row(line, text) or self.take_legend(line, text)
+    def take(self, line: int, text: str) -> None:
+        """Take the units in a line, either a row of units or a legend."""
+        if not self.take_row(line, text):
+            self.take_legend(line, text)
 
-    def take_legend(self, line: int, text: str) -> bool:
-        """Take the units after the names of columns in a line.  Return whether there are any."""
+    def take_legend(self, line: int, text: str) -> None:
+        """Take the units after the names of columns in a line."""
         legend = [*units_in_legend(text, [*self.inputs.values()])]
         for name, unit in legend:
             self._take_one(line, self.names.index(name), unit)
         if not legend and self.remedy is None:
             self._refuse_of_another_name(line, text)
-        return bool(legend)
 
     def take_row(self, line: int, text: str, is_no_row: bool = False) -> bool:
         """Take the units of a line that contains only units.  Return whether it is such a line.

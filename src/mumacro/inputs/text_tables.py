@@ -359,11 +359,11 @@ def find_table(
         sheets,
         header,
         units,
-        dialect.signs,
-        "\t" if header.sep == BLANKS else header.sep,
-        len(units.names),
-        max(begin, header.end + 1),
-        last,
+        signs=dialect.signs,
+        sep="\t" if header.sep == BLANKS else header.sep,
+        width=len(units.names),
+        first=max(begin, header.end + 1),
+        last=last,
     )
     if not column_names.are_among(units.names):  # which is reported
         return table
@@ -374,8 +374,7 @@ def find_table(
         units.take_cells(dialect.units + 1, ["", *cells[1:]])
     for i in range(header.end, min(table.first - 1, len(lines))):
         units.take(i + 1, lines[i])
-    start = Piece(1, "\n".join(lines))
-    first, repeated = _first_row(table, start)
+    first, repeated = _first_row(table, Piece(1, "\n".join(lines)))
     skipped = [
         i
         for i, line in enumerate(lines[: first - 1], 1)
@@ -383,7 +382,8 @@ def find_table(
     ]
     table = replace(table, first=first, skipped=skipped, repeated=repeated - units.lines)
     units.remedy = table.remedy
-    return replace(table, signs=_signs_in(table, start))
+    first_rows = Piece(1, "\n".join(lines[: first - 1 + LOOKED_AT]))
+    return replace(table, signs=_signs_in(table, first_rows))
 
 
 def _first_row(table: TextTable, start: Piece) -> tuple[int, set[int]]:
