@@ -162,7 +162,7 @@ class TextSource:
     ) -> None:
         self.files, self.tables = files, list[TextTable]()
         #: for each file: the lines that repeat the header or its units, so far
-        self._repeated = [set[int]() for _ in files]
+        self._repeated = [dict[int, Line]() for _ in files]
         for path in files:
             try:
                 table = find_table(path, column_names, dialect)
@@ -205,7 +205,9 @@ class TextSource:
         table, places = self.tables[file], [self.heads.index(name) for name in names]
         try:
             for rows in table.rows(lambda text: _read_at_once(text, table)):
-                self._repeated[file] |= {line for line, it in rows.skipped if it is Line.REPEATED}
+                self._repeated[file] |= {
+                    line: what for line, what in rows.skipped.items() if what is Line.REPEATED
+                }
                 if not rows.texts:
                     continue
                 columns = rows.columns

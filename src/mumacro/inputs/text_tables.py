@@ -12,8 +12,8 @@ each record is; ``cells`` finds the decimal separator, and reads the numbers.
 
 import enum
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -119,7 +119,7 @@ class Rows(NamedTuple):
     #: by the index of a row: its text in the file, and its fault
     faults: Mapping[int, tuple[str, str]] = {}
     #: lines between them that are neither rows nor empty
-    skipped: Sequence[tuple[int, Line]] = ()
+    skipped: Mapping[int, Line] = {}
     columns: Any = None  #: if they were read at once
 
     def cells(self) -> Iterator[list[str]]:
@@ -150,12 +150,11 @@ class TextTable:
     first: int  #: the first line that may be data
     last: int | None  #: the last, if a person names it
     #: lines before it that are not empty, not the header and not units
-    skipped: Sequence[int] = ()
-    repeated: Collection[int] = ()  #: the ones of them that repeat the header
+    skipped: Mapping[int, Line] = field(default_factory=dict)
 
-    def read_as(self, repeated: Collection[int]) -> str:
-        """Return in a few words how the table was read, with the unit of each input.  ``repeated``
-        are the lines between rows that repeat the header or its units."""
+    def read_as(self, skipped: Mapping[int, Line]) -> str:
+        """Return in a few words how the table was read, with the unit of each input; ``skipped``
+        are lines between rows."""
         grouped, units = self.signs.grouped, self.units
         is_utf8 = self.encoding in ("", "utf-8", "utf-8-sig")
         words = [] if is_utf8 else [NAMES.get(self.encoding, self.encoding)]
@@ -166,7 +165,7 @@ class TextTable:
         words += [f"units in {_listed(units.lines)}"] if units.lines else []
         words += [f"rows {self.first}..{self.last}"] if self.last else []
         of_inputs = ", ".join(f"{name} [{unit}]" for name, unit in units.of_inputs().items())
-        lines = {*self.repeated, *repeated}
+        lines = [i for i, what in {**self.skipped, **skipped}.items() if what is Line.REPEATED]
         again = f"; the header again in {_listed(lines)}, left out" if lines else ""
         return f"{self.sheets}{', '.join(words)}; {of_inputs}{again}"
 
@@ -210,7 +209,7 @@ class TextTable:
     def account_for(self, piece: Piece) -> tuple[Rows, Record | None]:
         """Return the rows in some lines, and the record that goes on behind them."""
         lines, texts = list[int](), list[str]()
-        faults, skipped = dict[int, tuple[str, str]](), list[tuple[int, Line]]()
+        faults, skipped = dict[int, tuple[str, str]](), dict[int, Line]()
         rows, begun = Rows(lines, piece.share, texts, self.sep, faults, skipped), None
         for record in records(piece, self.sep, self.is_comment):
             if record.is_open:
@@ -225,7 +224,7 @@ class TextTable:
                 lines.append(record.line)
                 texts.append(what.text)
             elif what is not Line.EMPTY:
-                skipped.append((record.line, what))
+                skipped[record.line] = what
         return rows, begun
 
     # --- what a record is -------------------------------------------------------------------------
@@ -240,11 +239,12 @@ class TextTable:
                 return TableRow(text)
         if text.count(sep) > 2 * width + 1000 and not is_comment(text):  # too long to be split
             return self._irregular(text.count(sep) + 1)
-        if not text.strip(f" \t{sep}"):
+        cells = split_row(text, sep)
+        filled = [cell.strip() for cell in cells if cell.strip()]
+        if not filled:
             return Line.EMPTY
         if self._repeats_header(line, text):
             return Line.REPEATED
-        cells = split_row(text, sep)
         if is_comment(text) and (len(cells) != width or self.is_comment(text)):
             if "\n" in text:
                 raise TextError(f"line {line}: a quote in a comment is not closed: leave it out")
@@ -252,9 +252,6 @@ class TextTable:
             return Line.LEFT_OUT
         if not text.strip(_OF_RULER) and _RULER.search(text):
             return Line.LEFT_OUT
-        filled = [cell.strip() for cell in cells if cell.strip()]
-        if not filled:  # a blank line whose cells are in quotes
-            return Line.EMPTY
         if names_statistics(filled[0]):
             what = f"{filled[0]!r} begins a row of statistics"
             raise TextError(f"line {line}: {what}: {self.remedy(line)}")
@@ -374,29 +371,27 @@ def find_table(
         units.take_cells(dialect.units + 1, ["", *cells[1:]])
     for i in range(header.end, min(table.first - 1, len(lines))):
         units.take(i + 1, lines[i])
-    first, repeated = _first_row(table, Piece(1, "\n".join(lines)))
-    skipped = [
-        i
+    first, found = _first_row(table, Piece(1, "\n".join(lines)))
+    skipped = {
+        i: found.get(i, Line.LEFT_OUT)
         for i, line in enumerate(lines[: first - 1], 1)
         if line.strip() and i not in units.lines and not header.start < i <= header.end
-    ]
-    table = replace(table, first=first, skipped=skipped, repeated=repeated - units.lines)
+    }
+    table = replace(table, first=first, skipped=skipped)
     units.remedy = table.remedy
     first_rows = Piece(1, "\n".join(lines[: first - 1 + LOOKED_AT]))
     return replace(table, signs=_signs_in(table, first_rows))
 
 
-def _first_row(table: TextTable, start: Piece) -> tuple[int, set[int]]:
-    """Return the line of the first row, and the lines before it that repeat the header or its
-    units.  Take the units in lines before it."""
-    data, repeated = table.data_in(start), set[int]()
+def _first_row(table: TextTable, start: Piece) -> tuple[int, dict[int, Line]]:
+    """Return the line of the first row, and what the lines before it are.  Take their units."""
+    data, found = table.data_in(start), dict[int, Line]()
     for record in records(data, table.sep, table.is_comment) if data else ():
         what = None if record.is_open else table.account(record)
         if not isinstance(what, Line):
-            return record.line, repeated
-        if what is Line.REPEATED:
-            repeated.add(record.line)
-    return max(table.first, len(start.lines) + 1), repeated
+            return record.line, found
+        found[record.line] = what
+    return max(table.first, len(start.lines) + 1), found
 
 
 def _signs_in(table: TextTable, start: Piece) -> Signs:

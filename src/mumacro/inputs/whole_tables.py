@@ -9,7 +9,7 @@ from mumacro.errors import TextError
 from mumacro.inputs.cells import numbers_of
 from mumacro.inputs.layout import Dialect
 from mumacro.inputs.names import ColumnNames, absent, find_heads
-from mumacro.inputs.text_tables import Line, Most, TextTable, find_table, names_statistics
+from mumacro.inputs.text_tables import Most, TextTable, find_table, names_statistics
 from mumacro.inputs.units import checked_in_si
 from mumacro.kernel.arrays import Array
 
@@ -54,9 +54,9 @@ def read_numbers(
     if faults:
         raise TextError.of([f"line {table.header.start + 1}: {fault}" for fault in faults])
     lines, rows, wrong = list[int](), list[list[str]](), list[tuple[int, str]]()
-    skipped = list[tuple[int, Line]]()
+    skipped = {**table.skipped}
     for part in table.rows():
-        skipped += part.skipped
+        skipped |= part.skipped
         if len(lines) + len(part.lines) > most.rows:
             where = f"line {part.lines[most.rows - len(lines)]}"
             raise TextError(f"{where}: there are more than {most.rows:,} rows: average them")
@@ -80,9 +80,8 @@ def read_numbers(
             wrong.append((lines[j], f"line {lines[j]}: {name} {fault}"))
     if wrong:
         raise _wrong_rows(sorted(wrong, key=lambda one: one[0]), lines, dialect)
-    read_as = table.read_as({line for line, what in skipped if what is Line.REPEATED})
-    left_out = [*table.skipped, *(line for line, _ in skipped)]
-    return TableOfNumbers(si, as_written, units.of_inputs(), lines, left_out, read_as)
+    read_as = table.read_as(skipped)
+    return TableOfNumbers(si, as_written, units.of_inputs(), lines, [*skipped], read_as)
 
 
 def _refuse_named_statistics(table: TextTable, lines: list[int], rows: list[list[str]]) -> None:

@@ -49,14 +49,13 @@ def read_sheet(
     sheet, if the file is not a workbook, or if openpyxl is missing.
     """
     with io.BytesIO(source) if isinstance(source, bytes) else source.open("rb") as stream:
-        _refuse_no_workbook(stream)
+        _check(stream)
         try:
             import openpyxl  # type: ignore[import-untyped]
         except ModuleNotFoundError as error:
             remedy = f"{missing('files', error)}; or save it as CSV"
             raise TextError(f"it is a workbook (.xlsx), and {remedy}") from None
         try:
-            _weigh(stream)
             book: Any = openpyxl.load_workbook(stream, read_only=True, data_only=True)
             one = _chosen(book.worksheets, sheet, decimal, has_names)
             formulas: Any = None
@@ -141,39 +140,38 @@ def _has_formulas(stream: BinaryIO) -> bool:
     return False
 
 
-def _weigh(stream: BinaryIO) -> None:
-    """Refuse a workbook that would be too large when unpacked.  The directory of the zip file tells
-    the sizes, and no part unpacks to more."""
-    sizes = dict.fromkeys((_SHEETS, _TEXTS, _OTHERS), 0)
-    with zipfile.ZipFile(stream) as parts:
-        for part in parts.infolist():
-            name = part.filename.lower().lstrip("/")
-            if name.startswith(_UNREAD):
-                continue
-            is_sheet = name.startswith("xl/worksheets/")
-            most = _SHEETS if is_sheet else _TEXTS if name == "xl/sharedstrings.xml" else _OTHERS
-            sizes[most] += part.file_size
-            if sizes[most] > most:
-                raise TextError(
-                    f"it is a workbook with more than {most >> 20} MiB in {part.filename[:80]!r} "
-                    "and parts such as this; save it as CSV"
-                )
+def _check(stream: BinaryIO) -> None:
+    """Say what a zip file is if it is not a workbook, and refuse a workbook that would be too large
+    when unpacked; openpyxl refuses a damaged one.
 
-
-def _refuse_no_workbook(stream: BinaryIO) -> None:
-    """Say what a zip file is if it is not a workbook; openpyxl refuses a damaged one."""
+    The directory of the zip file tells the sizes, and no part unpacks to more.
+    """
     if _OPEN_DOCUMENT in stream.read(200):
         raise TextError("it is an OpenDocument file (.ods); save it as .xlsx or as CSV")
     try:
         with zipfile.ZipFile(stream) as parts:
-            names = parts.namelist()
+            members = parts.infolist()
     except (zipfile.BadZipFile, OSError, ValueError):
         return
+    names = [member.filename for member in members]
     if "xl/workbook.bin" in names:
         raise TextError("it is a binary workbook (.xlsb); save it as .xlsx or as CSV")
     if not any(name.lower().lstrip("/").startswith("xl/") for name in names):
-        members = ", ".join(name[:60] for name in names[:3])
-        raise TextError(f"it is a zip file with {members or 'nothing in it'}; unpack it")
+        first = ", ".join(name[:60] for name in names[:3])
+        raise TextError(f"it is a zip file with {first or 'nothing in it'}; unpack it")
+    sizes = dict.fromkeys((_SHEETS, _TEXTS, _OTHERS), 0)
+    for member in members:
+        name = member.filename.lower().lstrip("/")
+        if name.startswith(_UNREAD):
+            continue
+        is_sheet = name.startswith("xl/worksheets/")
+        most = _SHEETS if is_sheet else _TEXTS if name == "xl/sharedstrings.xml" else _OTHERS
+        sizes[most] += member.file_size
+        if sizes[most] > most:
+            raise TextError(
+                f"it is a workbook with more than {most >> 20} MiB in {member.filename[:80]!r} "
+                "and parts such as this; save it as CSV"
+            )
 
 
 def _text(cell: Any, decimal: str | None) -> str:
