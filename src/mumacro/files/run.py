@@ -131,8 +131,8 @@ class _Run:
                 )
         self.n_rows = self.n_rejected = 0  # so far
         self.states_at_start = [_state_of(path) for path in self.files]
-        #: rows of a text are written as they were read, with the answers after them
         is_text = sources.ending_of(self.files[0]) != sources.PARQUET
+        #: rows of a text are written as they were read, with the answers after them
         self.keeps_lines = is_text and ending != sources.PARQUET
         folder = str(cases[0]) if len(cases) == 1 and Path(cases[0]).is_dir() else None
         self.source = (

@@ -179,7 +179,11 @@ def _fits(header: Header, lines: Sequence[str], labview: bool) -> bool:
 def _likely_header(lines: Sequence[str], skip: int, seps: Sequence[str]) -> Header:
     """Return the line that is probably meant as a header: a line whose names are similar to those
     of inputs, or the line above the first numbers."""
-    best, most = None, 0.0
+    first = next((i for i in range(skip, len(lines)) if lines[i].strip()), None)
+    if first is None:
+        raise TextError(f"line {skip + 1}: must name the columns, and is empty")
+    cells = split_header(lines[first][:10_000], seps[0])[:MOST_COLUMNS]
+    best, most = Header(first, first + 1, seps[0], cells), 0.0
     for i in range(skip, min(len(lines), LOOKED_AT)):
         for sep in seps:
             cells = split_header(uncommented(lines[i][:100_000]), sep)
@@ -192,13 +196,7 @@ def _likely_header(lines: Sequence[str], skip: int, seps: Sequence[str]) -> Head
             score = alike + 0.5 * is_above + 0.01 * (sep in lines[i])
             if not any(map(starts_as_number, cells)) and score > most:
                 best, most = Header(i, i + 1, sep, cells), score
-    if best is not None:
-        return best
-    index = next((i for i in range(skip, len(lines)) if lines[i].strip()), None)
-    if index is None:
-        raise TextError(f"line {skip + 1}: must name the columns, and is empty")
-    cells = split_header(lines[index][:10_000], seps[0])[:MOST_COLUMNS]
-    return Header(index, index + 1, seps[0], cells)
+    return best
 
 
 # --- units ----------------------------------------------------------------------------------------
@@ -294,25 +292,13 @@ class ColumnUnits:
 
     def take_row(self, line: int, text: str, is_no_row: bool = False) -> bool:
         """Take the units of a line that contains only units.  Return whether it is such a line.
+        Raise TextError if the units belong to no column.
 
         If ``is_no_row`` is true for the line and it is not a comment, columns that are not inputs
         may hold any text.
         """
-        units = self._cells_of_units(line, text, is_no_row)
-        self.take_cells(line, units or [])
-        return units is not None
-
-    def take_cells(self, line: int, units: Sequence[str]) -> None:
-        """Take the unit of each column; skip an empty one."""
-        for i, unit in enumerate(units[: len(self.names)]):
-            if unit:
-                self._take_one(line, i, unit)
-
-    def _cells_of_units(self, line: int, text: str, is_no_row: bool) -> list[str] | None:
-        """Return the units in a line that contains only units, or None for another line.  Raise
-        TextError if they belong to no column."""
         if len(text) > 100_000:
-            return None
+            return False
         bare = uncommented(text)
         if is_comment(text) and (label := _LABEL_BEFORE.match(bare)):
             bare = bare[label.end() :]
@@ -328,7 +314,7 @@ class ColumnUnits:
         filled = [unit for unit in units if unit not in NO_UNIT]
         known = [unit for unit in filled if is_unit(unit)]
         if not known or any(map(starts_as_number, filled)):  # or a setting with its unit
-            return None
+            return False
         if not any(units[width:]):
             units, cells = units[:width], cells[:width]
         is_whole = len(cells) == width > 1
@@ -341,14 +327,21 @@ class ColumnUnits:
         )
         are_short = all(is_unit(unit) or len(unit) < 8 for unit in filled)
         if fits and ((is_no_row and is_whole) or (are_short and (is_sure or width > 2))):
-            return units
+            self.take_cells(line, units)
+            return True
         if is_sure and 2 * len(known) > len(filled):
             shown = " ".join(text.split())[:60]
             raise TextError(
                 f"line {line}: {shown!r} has units that cannot be assigned to the columns "
                 f"{', '.join(self.names[:8])}: write each behind its name, as in v0 [mm/s]"
             )
-        return None
+        return False
+
+    def take_cells(self, line: int, units: Sequence[str]) -> None:
+        """Take the unit of each column; skip an empty one."""
+        for i, unit in enumerate(units[: len(self.names)]):
+            if unit:
+                self._take_one(line, i, unit)
 
     def _take_one(self, line: int, i: int, unit: str) -> None:
         """Take the unit of one column."""

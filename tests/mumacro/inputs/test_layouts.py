@@ -51,6 +51,7 @@ BEGIN, MIDDLE = "1,0.069\n2,0.097\n", "5,0.174\n10,0.221\n"
 
 #: what is read
 READ: dict[str, str | bytes] = {
+    "blanks beside quotes": '"v0 [mm/s]" , "mu_macro"\n' + rows(' "{v}" , "{m}" '),
     "blank lines whose cells are in quotes": HEAD + '"",""\n' + PLAIN + '" ",\n',
     "TDMS as text, units in the list of channels": (
         "Group\tChannels\nFriction\t2\n\nChannel\tDatatype\tUnit\tLength\n"

@@ -23,8 +23,17 @@ from hypothesis import strategies as st
 from mumacro.errors import InputError, TextError
 from mumacro.fits.fit import fit
 from mumacro.fits.measured_points import read_points
-from mumacro.inputs.cells import BLANKS, GAPS, Signs, evidence, numbers_of
-from mumacro.inputs.decoding import Text
+from mumacro.inputs.cells import (
+    BLANKS,
+    GAPS,
+    Signs,
+    evidence,
+    joined,
+    numbers_of,
+    records,
+    split_row,
+)
+from mumacro.inputs.decoding import Piece, Text
 from mumacro.inputs.layout import Dialect
 from mumacro.inputs.names import ColumnNames, absent
 from mumacro.inputs.text_tables import Most
@@ -287,6 +296,25 @@ def test_lines_do_not_depend_on_how_the_bytes_come(
         for i, line in enumerate(piece.lines)
     ]
     assert numbered == list(enumerate(expected, 1))
+
+
+@given(
+    rows=st.lists(
+        st.lists(st.text('ab ",;\n'), min_size=1, max_size=4).filter(lambda row: row != [""]),
+        min_size=1,
+        max_size=4,
+    ),
+    sep=st.sampled_from(",;"),
+)
+def test_cells_are_those_that_were_written_whatever_signs_they_have(
+    rows: list[list[str]], sep: str
+) -> None:
+    lines = [joined(row, sep) for row in rows]
+    found = [*records(Piece(1, "\n".join(lines)), sep, lambda _line: False)]
+    assert [split_row(record.text, sep) for record in found] == rows
+    assert not any(record.is_open for record in found)
+    begins = itertools.accumulate((line.count("\n") + 1 for line in lines), initial=1)
+    assert [record.line for record in found] == [*begins][:-1]
 
 
 @given(
