@@ -250,8 +250,7 @@ def _read_at_once(text: str, table: TextTable) -> list[pa.Array] | None:
     if columns is None or _may_hold_no_row(columns):
         return None
     has_number = functools.reduce(pc.or_, (pc.is_valid(columns[i]) for i in inputs))
-    is_plain = len(has_number) == text.count("\n") + 1 and pc.all(has_number).as_py()
-    return columns if is_plain else None
+    return columns if pc.all(has_number).as_py() else None
 
 
 def _columns(text: str, table: TextTable, inputs: Collection[int]) -> list[pa.Array] | None:

@@ -173,7 +173,7 @@ class TextTable:
 
     def rows(self, columns_of: Callable[[str], Any] = lambda _text: None) -> Iterator[Rows]:
         """Yield the rows in pieces.  Account for each record of a piece, unless ``columns_of``
-        returns its columns; then each line is a row."""
+        returns columns in which each line is a row."""
         begun: Record | None = None
         text = Text(byte_pieces(self.source), self.dialect.encoding)
         for whole in text.pieces():
@@ -185,12 +185,12 @@ class TextTable:
             if begun:
                 piece = Piece(begun.line, f"{begun.text}\n{piece.text}", piece.share)
             columns = columns_of(piece.text)
-            if columns is None:
-                rows, begun = self.account_for(piece)
-            else:
-                texts = piece.lines
+            texts = piece.lines if columns else []
+            if columns and len(columns[0]) == len(texts):
                 lines = range(piece.first, piece.first + len(texts))
                 rows, begun = Rows(lines, piece.share, texts, self.sep, columns=columns), None
+            else:
+                rows, begun = self.account_for(piece)
             if begun and len(begun.text) > LONGEST:
                 break
             yield rows
