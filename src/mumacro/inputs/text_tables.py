@@ -46,7 +46,7 @@ from mumacro.inputs.layout import (
     Header,
     find_header,
 )
-from mumacro.inputs.names import ColumnNames
+from mumacro.inputs.names import ColumnNames, find_heads
 from mumacro.inputs.workbooks import BEGIN, SEP, read_sheet
 
 _WORDS = {",": "comma", ";": "semicolon", "|": "bar", "\t": "tab", BLANKS: "blanks"}
@@ -362,7 +362,8 @@ def find_table(
         first=max(begin, header.end + 1),
         last=last,
     )
-    if not column_names.are_among(units.names):  # which is reported
+    _, faults = find_heads(units.heads, column_names.input_of)
+    if faults or not column_names.are_among(units.names):  # which is reported before any line
         return table
     if dialect.units is None:
         units.take_above(lines[: header.start], dialect.skip)

@@ -535,6 +535,7 @@ ALONE = "must be a number alone: write its unit into the header"
         (b"PAR1", ("Parquet",)),
         (b"v0;mu_macro\n0,5;0.5\n", ("line 2", "'0,5'", "'0.5'", "decimal")),
         (b"v0 [s],mu_macro\n1,2\n", ("line 1", "'v0 [s]'")),
+        (b"v0 [s],mu_macro\n1,2\nMean,2\n", ("line 1: ", "'v0 [s]'")),
         (b"v0,v0,mu_macro\n1,1,2\n", ("line 1", "v0 is there twice")),
     ],
 )
