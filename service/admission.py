@@ -110,6 +110,7 @@ class Admission:
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.held_bytes, self.refused = 0, 0
+        self.begun = 0  # how often work has begun in a slot
         self._bytes_of, self._slots_of = Counter[str](), Counter[str]()
         self._long_of = Counter[str]()
         self.queue: list[_Waiting] = []
@@ -266,6 +267,7 @@ class Ticket:
         if self._slot is None or (is_long and not self._slot):
             self.leave()
             await self.admission.take(self.client, is_long)
+            self.admission.begun += 1
             self._slot, self._since = is_long, asyncio.get_running_loop().time()
             if is_long:
                 fields = {"request_id": self._scope.get("request_id"), "bytes": self._bytes}

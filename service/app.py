@@ -73,12 +73,14 @@ _SWITCH_S = 0.0002
 # back to the system, and so does the free end of a heap above 16 MiB; all threads have one heap.
 # glibc's own limits grow with the size of freed blocks, and each thread has a heap: so six batches
 # of 9 MB at a time took 200 MB and left 150 MB, instead of 95 and 30 MB.  Lower limits cost time,
-# because the system clears every page that it gives.
+# because the system clears every page that it gives.  Other free blocks go back when work has
+# ended.
 _HEAPS = {
     -3: 4 * 2**20,  # M_MMAP_THRESHOLD
     -1: 16 * 2**20,  # M_TRIM_THRESHOLD
     -8: 1,  # M_ARENA_MAX
 }
+_LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
 # held while a description is made, because FastAPI cannot make two at the same time
 _DESCRIBING = threading.Lock()
 # time after the grace period (or after a stop without requests) until all work has ended
@@ -101,14 +103,20 @@ def see_now(state: State) -> None:
 
 
 async def _look(state: State) -> None:
+    """Update the metrics, and when work has ended give its memory back to the system: free blocks
+    between others, too, which takes about a millisecond."""
+    trim, ended = getattr(_LIBC, "malloc_trim", None), 0
     while True:
         see_now(state)
         await asyncio.sleep(_LOOK_EVERY_S)
+        if trim is not None and ended < state.admission.begun and not state.admission.slots:
+            ended = state.admission.begun
+            trim(0)
 
 
 def _bound_heaps() -> None:
     """Let memory that large bodies have used go back to the system, if the system has glibc."""
-    set_option = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
+    set_option = getattr(_LIBC, "mallopt", None)
     if set_option is not None:
         for number, value in _HEAPS.items():
             set_option(number, value)

@@ -352,8 +352,11 @@ def test_many_large_batches_at_once_take_little_more_memory_than_their_bodies(
         # One body at a time is read whole: 31 MB as objects.  If all were, it would be 155 MB more.
         whole = 32_000_000
         assert 2**20 * (server.memory("VmHWM") - base) < places * each + whole
-        # what is free is the system's again
-        assert 2**20 * (server.memory() - base) < len(rows) + whole
+        # what is free is soon the system's again
+        until = time.monotonic() + PATIENCE_S
+        while 2**20 * (server.memory() - base) > 3 * len(rows):
+            assert time.monotonic() < until, "memory stays"
+            time.sleep(0.1)
 
 
 @pytest.mark.parametrize("pieces", [1, 2, 99])
