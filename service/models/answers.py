@@ -12,7 +12,6 @@ from pydantic import BaseModel, Field, WithJsonSchema, create_model
 
 from mumacro.inputs.fields import AMPLITUDE, ContactName, DirectionName
 from mumacro.outputs import MEMBERS, OUTPUTS
-from mumacro.outputs.answer import BAND
 from mumacro.outputs.entry import Member
 
 from .inputs import Name
@@ -65,9 +64,7 @@ def _answer(name: str, included: Any, about: str, number: Any, regime: Any, sour
     """Return the model of the default answer and of what ``include`` adds."""
     output_paths = {path for output in OUTPUTS.values() for path in output.members}
     members: dict[str, Any] = {
-        path: (number | None, _described(one, None)) if path in BAND else (number, _described(one))
-        for path, one in MEMBERS.items()
-        if path not in output_paths
+        path: (number, _described(one)) for path, one in MEMBERS.items() if path not in output_paths
     }
     members["regime"] = regime, Field(description="How the contact moves")
     text = "Block of the table, or closed-form tail, that the value came from"

@@ -63,7 +63,7 @@ REGIMES = {
 }
 #: rows of :data:`ROWS` that have another name for a contact
 _CALLED = {("one spring", "ball"): "a ball"}
-_SHOWN = ("std", "std_share", "gradient")  # these are shown in their own rows
+_SHOWN = ("std", *BAND, "std_share", "gradient")  # these are shown in their own rows
 #: paths that have the unit of an input
 _UNIT_OF = {"limits.v0_crit": "v0", "groups.l0": "y0"}
 
@@ -375,7 +375,9 @@ def _rows_in_words(answer: Any, count: int, units: Mapping[str, str]) -> Rows:
     if "std" in outputs:
         shares = {name: outputs[f"std_share.{name}"] for name in kind.fields}
         parts = ", ".join(f"{name} {100.0 * x:.3g} %" for name, x in shares.items() if x > 0.0)
-        meaning = f"standard deviation; {parts}" if parts else "standard deviation"
+        least, most = (known(outputs[name], 2) for name in BAND)
+        meaning = f"standard deviation; one deviation up and down: {least} to {most}"
+        meaning += f"; {parts}" if parts else ""
         rows[0] = ("mu_macro", f"{rows[0][1]} ± {known(std, 2)}", "[-]", meaning)
     for name, slope in (answer.gradient or {}).items():
         per = PER_UNIT[MEASURED_AS.get(name, name)]

@@ -17,7 +17,7 @@ from mumacro.motions.motion import motion
 from mumacro.outputs import MEMBERS, OUTPUTS
 from mumacro.outputs.answer import TEXTS
 from mumacro.outputs.evaluation import chosen
-from tests.support.cases import CASE, Case, as_kind, flat, tables, without
+from tests.support.cases import CASE, Case, as_kind, every_pair, flat, tables, without
 from tests.support.comparing import close
 from tests.support.refusals import refused
 
@@ -373,8 +373,31 @@ def test_where_first_order_is_not_enough_is_told_for_one_case(table: Surrogate) 
     slope = table.evaluate(**CASE, gradient=True).gradient["k"] * 6e5
     off = max(abs(up - bent.mu_macro - slope), abs(down - bent.mu_macro + slope))
     assert off > 0.2 * bent["std"]
+    alone: Any = table.evaluate(**CASE, std_k=6e5)
+    assert [alone.mu_macro_low, alone.mu_macro_high] == close(sorted((up, down)), rel=1e-12)
     [below] = table.evaluate(**CASE, std_v0=0.02).remarks  # v0 one deviation down is negative
     assert (below["row"], below["field"]) == ("std", "v0")
+    load: Case = {**without(CASE, "y0"), "Fz_amplitude": 9.5, "direction": "normal"}
+    for name in ("Fz", "Fz_amplitude"):
+        [lifted] = table.evaluate({**load, f"std_{name}": 1.0}).remarks
+        assert (lifted["row"], lifted["field"]) == ("std", name)
+        assert "lifts off" in lifted["text"]
+
+
+@every_pair
+def test_the_band_of_columns_is_that_of_each_case(table: Surrogate, pair: Any) -> None:
+    words, _, case = as_kind(CASE, pair)
+    spreads = {f"std_{name}": np.array([0.0, 1e-3, 0.3, 2.0]) * x for name, x in case.items()}
+    columns: Any = table.evaluate(**case, **words, **spreads)
+    low, high = columns["mu_macro_low"], columns.mu_macro_high
+    for i in range(low.size):
+        one: Any = table.evaluate(**case, **words, **{name: x[i] for name, x in spreads.items()})
+        assert (one.mu_macro_low, one.mu_macro_high) == close((low[i], high[i]), rel=1e-12)
+    assert (low[0], high[0]) == (columns.mu_macro[0], columns.mu_macro[0])
+    assert high[1] - low[1] == close(2.0 * columns["std"][1], rel=2e-2)
+    assert (np.diff(low) <= 0.0).all()
+    assert (np.diff(high) >= 0.0).all()
+    assert (low >= 0.0).all()
 
 
 @pytest.mark.parametrize(

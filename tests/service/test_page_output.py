@@ -85,6 +85,7 @@ LEFT = {
     "#v0=0&contact=rigid": "Nothing of µ₀ is left",
     "#k=0.1..10 N/um": "12 to 99.9 % of µ₀ is left",
     "#k=1 ± 0.1 N/um": "About 80 % of µ₀ is left",
+    "#k=1 ± 0.5 N/um": "About 50 to 96 % of µ₀ is left",
     "#y0=20um": "1.2 % of µ₀ is left",
     "#v0=2 m/s": "99.6 % of µ₀ is left",
 }
@@ -118,6 +119,7 @@ def test_what_holds_at_the_middle_of_an_interval_names_it(open_page: Any) -> Non
     ("address", "mu", "v"),
     [
         ("#k=1 ± 0.1 N/um&mu0=0.3 ± 0.02", "0.240 ± 0.028", "0.0265 ± 0.0032"),
+        ("#k=1 ± 0.5 N/um", "0.149 to 0.287", "0.0265 ± 0.013"),
         ("#k=0.1..10 N/um", "0.035 to 0.300", "0.00265 to 0.265"),
     ],
 )

@@ -267,11 +267,7 @@ export function lawPanel(store, moved) {
     if (here === undefined) return;
     const x = toUnit(law.along, here, unit());
     const { low, high } = answer.inputs[law.along];
-    // a deviation reaches as far as the band, which is not symmetric
-    const ends =
-      answer.std && band()
-        ? band().map((end) => end[bisectCenter(law.values, here)])
-        : endsOf(answer);
+    const ends = endsOf(answer);
     if (high > low)
       plot.bar(...[low, high].map((end) => [toUnit(law.along, end, unit()), answer.mu_macro]));
     else if (ends) plot.bar(...ends.map((end) => [x, end]));

@@ -32,13 +32,24 @@ const FEW = 4; // digits of the number
 
 const symbolOf = (name) => about.inputs[name === "omega" ? "f" : name].symbol;
 
-/** The number as texts: the value, or both ends of an interval, and the deviation. */
+/** Whether one deviation of an input changes µ otherwise than its slope says. */
+const isRough = ({ std, remarks = [] }) => std && remarks.some(({ row }) => row === "std");
+
+/** Both ends of what a deviation or an interval leaves open; null where neither is given. */
+export const endsOf = ({ mu_macro_low: low, mu_macro_high: high }) =>
+  high > low ? [low, high] : null;
+
+/** The ends, where they say more than a deviation does. */
+const shownEnds = (answer) => (!answer.std || isRough(answer) ? endsOf(answer) : null);
+
+/** The number as texts: the value, or both ends of what is open, and the deviation. */
 export function headline(answer, all) {
-  const { mu_macro: mu, std, error_bound: bound, mu_macro_low: low, mu_macro_high: high } = answer;
-  if (high > low) {
+  const { mu_macro: mu, std, error_bound: bound } = answer;
+  const ends = shownEnds(answer);
+  if (ends) {
     const [from, to] = all
-      ? [low, high].map((end) => friction(end, digitsWithin(end, bound) + 1))
-      : withEnds(low, high);
+      ? ends.map((end) => friction(end, digitsWithin(end, bound) + 1))
+      : withEnds(...ends);
     return { value: `${from} to ${to}`, std: null };
   }
   if (all) {
@@ -48,12 +59,6 @@ export function headline(answer, all) {
   if (!std) return { value: friction(mu, FEW), std: null };
   const [value, deviation] = withDeviation(mu, std);
   return { value, std: deviation };
-}
-
-/** Both ends of what a deviation or an interval leaves open; null where neither is given. */
-export function endsOf({ mu_macro: mu, std, mu_macro_low: low, mu_macro_high: high }) {
-  if (high > low) return [low, high];
-  return std ? [Math.max(mu - std, 0), mu + std] : null;
 }
 
 /** µ of a case in a line of text, as the headline has it. */
@@ -69,10 +74,11 @@ function shortOf(answer, faults, old) {
   return `µ = ${inLine(answer)}, ${some(answer)}${shareOf(answer)} left`;
 }
 
-/** The share of µ₀ that is left: a value, or both ends of an interval. */
-function shareOf({ mu_macro_low: low, mu_macro_high: high, mu_ratio: ratio, inputs }) {
-  const { value: mu0 } = inputs.mu0;
-  const [from, to] = (high > low ? [low / mu0, high / mu0] : [ratio, ratio]).map(percent);
+/** The share of µ₀ that is left: a value, or both ends. */
+function shareOf(answer) {
+  const { value: mu0 } = answer.inputs.mu0;
+  const ends = shownEnds(answer)?.map((end) => Math.min(end / mu0, 1));
+  const [from, to] = (ends ?? [answer.mu_ratio, answer.mu_ratio]).map(percent);
   return from === to ? to : `${from.replace(" %", "")} to ${to}`;
 }
 
@@ -136,7 +142,8 @@ function deciding(answer, effect) {
 }
 
 /** Where the deviation of the number comes from. */
-function variance({ std_share: shares }) {
+function variance(answer) {
+  const { mu_macro: mu, std, std_share: shares } = answer;
   const parts = Object.entries(shares ?? {}).filter(([, share]) => share >= 0.005);
   const words = parts
     .sort(([, a], [, b]) => b - a)
@@ -144,7 +151,9 @@ function variance({ std_share: shares }) {
       const much = `${Math.round(100 * share)} %`;
       return `${much}${i ? "" : " of the variance"} from ${symbolOf(name)}`;
     });
-  const origin = `${words.join(", ")}; ± is one standard deviation.`;
+  const [value, deviation] = withDeviation(mu, std);
+  const middle = isRough(answer) ? `; to first order µ = ${value} ± ${deviation}.` : "";
+  const origin = `${words.join(", ")}${middle || "; ± is one standard deviation."}`;
   return words.length ? origin : "";
 }
 
@@ -273,9 +282,10 @@ export function numberPanel(store) {
     const length = value.length + (std ?? "").length / 2;
     $("number").classList.toggle("wide", length > 12 && length <= 16);
     $("number").classList.toggle("long", length > 16);
-    const deviation = std
-      ? html`<wbr /><span id="std"> ± ${std}</span> <span id="std-name">(1 std. dev.)</span>`
-      : nothing;
+    const deviation = [
+      std ? html`<wbr /><span id="std"> ± ${std}</span>` : nothing,
+      answer.std ? html` <span id="std-name">(1 std. dev.)</span>` : nothing,
+    ];
     render(html`<output id="mu" for="fields">${value}</output>${deviation}`, $("number"));
     write("share", remains(answer));
     write("regime", whole(spread(answer)));

@@ -175,9 +175,9 @@ const CALLED = {
 };
 
 /** The k that numbers of an interval of k belong to, in its middle; empty where k is one number. */
-export function middleOf({ mu_macro_low: low, mu_macro_high: high, inputs }) {
+export function middleOf({ mu_macro_low: low, mu_macro_high: high, std, inputs }) {
   const { value, unit } = inputs.k ?? {};
-  return high > low ? `k = ${inUnit("k", value, unit ?? undefined)}` : "";
+  return high > low && !std ? `k = ${inUnit("k", value, unit ?? undefined)}` : "";
 }
 
 /** A text in which no equation is broken over two lines. */

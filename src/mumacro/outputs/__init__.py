@@ -8,7 +8,6 @@ numbers are those of Benad, Nakano, Popov, Popov, "Active control of friction by
 oscillations" (Friction, 2018).
 """
 
-from mumacro.outputs.answer import BAND
 from mumacro.outputs.deviation import STD
 from mumacro.outputs.entry import Member, Output
 from mumacro.outputs.gradient import GRADIENT
@@ -28,6 +27,4 @@ MEMBERS: dict[str, Member] = {
     "mu_macro": Member("-", "Macroscopic coefficient of friction"),
     "mu_ratio": Member("-", "mu_macro/mu0, from 0 to 1"),
     "error_bound": Member("-", "Bound of the absolute error of mu_macro"),
-    BAND[0]: Member("-", "Smallest mu_macro over the interval of k, in a law also over deviations"),
-    BAND[1]: Member("-", "Largest mu_macro over the interval of k, in a law also over deviations"),
 } | {path: member for output in OUTPUTS.values() for path, member in output.members.items()}

@@ -25,7 +25,7 @@ else:
 
 # by source code; the last entry is for -1, an illegal case
 _SOURCE_NAMES = np.array([*SOURCES, ""], dtype=object)
-BAND = ("mu_macro_low", "mu_macro_high")  # for an interval of k
+BAND = ("mu_macro_low", "mu_macro_high")  # for an interval of k, and for deviations
 GROUPS = ("v_tilde", "y_tilde", "length_scale")
 #: the paths of the default answer
 DEFAULT = ("mu_macro", "mu_ratio", "regime", "error_bound", "source")
@@ -58,11 +58,12 @@ class Answer(Result, Generic[Number]):
     gradient_bound : dict of str to float or ndarray, or None
         Verified bounds of the absolute errors of ``gradient``.
     mu_macro_low, mu_macro_high : float or ndarray
-        Only for an interval of k: smallest and largest mu_macro over it [-].  All other values are
-        for its geometric middle; ``error_bound`` holds for these two as well.
+        Only for an interval of k: smallest and largest mu_macro over it [-]; all other values are
+        for its geometric middle, and ``error_bound`` holds for these two as well.  For deviations
+        of inputs: mu_macro one deviation up and down.
     outputs : dict of str to float or ndarray
-        The outputs that ``include`` asked for, by path [SI]; NaN at an illegal case of an array,
-        and where the output does not exist.
+        The outputs that ``include`` asked for, and those of an interval or of deviations, by path
+        [SI]; NaN at an illegal case of an array, and where the output does not exist.
 
     Examples
     --------
@@ -85,10 +86,9 @@ class Answer(Result, Generic[Number]):
         "gradient",
         "gradient_bound",
         "mu_macro",
-        *BAND,
         "mu_ratio",
-        "outputs",
         "notes_on_outputs",
+        "outputs",
         "source_code",
     )
 
@@ -123,9 +123,13 @@ class Answer(Result, Generic[Number]):
     # --- by name ----------------------------------------------------------------------------------
 
     def __getattr__(self, name: str) -> Any:
-        """Raise AttributeError that says how to ask for an output of this name."""
+        """Return an end of the band.  Raise AttributeError that says how to ask for an output of
+        another name."""
         if name in BAND:
-            raise AttributeError(f"{name} is there for an interval of k: evaluate(k_low=, k_high=)")
+            if name in self.outputs:
+                return self.outputs[name]
+            ask = "an interval of k, evaluate(k_low=, k_high=), or deviations, evaluate(std_k=)"
+            raise AttributeError(f"{name} is there for {ask}")
         if hasattr(type(self), name):  # a property without a value gives its own reason
             return object.__getattribute__(self, name)
         if name.startswith("_"):
@@ -191,22 +195,16 @@ class Answer(Result, Generic[Number]):
         return certain if self._shape else bool(certain)
 
     @property
-    def _always(self) -> tuple[str, ...]:
-        """Return the paths of the default answer."""
-        over_interval = self._cases is not None and self._cases.ends is not None
-        return (*DEFAULT, *BAND) if over_interval else DEFAULT
-
-    @property
     def paths(self) -> list[str]:
         """Return the paths of all outputs, in the order of the JSON of one case."""
-        return [*self._always, *self.outputs]
+        return [*DEFAULT, *self.outputs]
 
     def __getitem__(self, path: str) -> Any:
         """Return an output by its path.  Raise KeyError with the remedy for an output that was not
         asked for."""
         if path in self.outputs:
             return self.outputs[path]
-        if path in self._always:
+        if path in DEFAULT:
             return getattr(self, path)
         within = {
             name.removeprefix(f"{path}."): x
@@ -299,7 +297,7 @@ class Answer(Result, Generic[Number]):
         >>> answer.to_frame()["regime"].tolist()
         ['static', 'stick_slip']
         """
-        return {**{path: getattr(self, path) for path in self._always}, **self.outputs}
+        return {**{path: getattr(self, path) for path in DEFAULT}, **self.outputs}
 
     def _members(self) -> dict[str, Any]:
         """Return the JSON of one case: ``power.saved`` is ``saved`` within ``power``.
@@ -309,7 +307,7 @@ class Answer(Result, Generic[Number]):
         >>> [*Surrogate.open().evaluate(**case, include=("groups",)).to_dict()]
         ['mu_macro', 'mu_ratio', 'regime', 'error_bound', 'source', 'groups']
         """
-        members = {path: getattr(self, path) for path in self._always}
+        members = {path: getattr(self, path) for path in DEFAULT}
         if self.outputs:
             members |= nested(self.outputs)
         if said := self.remarks:
@@ -378,7 +376,7 @@ if TYPE_CHECKING:
         gradient_bound: dict[str, Number]
 
     class IntervalAnswer(AnswerWithGradient[Number]):
-        """Show a type checker an answer over an interval of k."""
+        """Show a type checker an answer over an interval of k, or with deviations."""
 
         mu_macro_low: Number
         mu_macro_high: Number

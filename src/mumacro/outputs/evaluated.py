@@ -1,12 +1,15 @@
 """Hold cases with their answer, as the functions of the outputs need them."""
 
 import math
+import sys
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from mumacro.inputs.cases import Cases
+from mumacro.inputs.fields import POSITIVE
 from mumacro.kernel.arrays import Array
 from mumacro.kernel.binding import Detail
 from mumacro.outputs.tabulated import Tabulated
@@ -88,6 +91,18 @@ class Evaluated:
         """Return v~crit at amplitudes in the shape of the cases."""
         crit = self.tabulated.crit(np.atleast_1d(y), self.kind)
         return crit if self.cases.shape else _item(crit)
+
+    @cached_property
+    def deviating(self) -> dict[str, tuple[Any, Any]]:
+        """Return by how much mu_macro changes if an uncertain input has one deviation more, and
+        less, down to its smallest legal value; NaN where the contact then lifts off."""
+        changes = {}
+        for name, spread in self.cases.std.items():
+            value, least = self.columns[name], sys.float_info.min if name in POSITIVE else 0.0
+            ends = value + spread, np.maximum(value - spread, least)
+            up, down = (self.replace(**{name: end}).mu_macro - self.mu_macro for end in ends)
+            changes[name] = up, down
+        return changes
 
     def replace(self, **columns: Any) -> "Evaluated":
         """Return the answers to the same cases with other values of some inputs, and with one k."""

@@ -13,7 +13,7 @@ from mumacro.inputs.fields import BALL, Kind
 from mumacro.kernel.binding import Detail
 from mumacro.outputs import OUTPUTS
 from mumacro.outputs.answer import BAND, GROUPS, Answer
-from mumacro.outputs.deviation import STD, bent
+from mumacro.outputs.deviation import STD, rough
 from mumacro.outputs.entry import Output, Values
 from mumacro.outputs.evaluated import Evaluated
 from mumacro.outputs.gradient import GRADIENT
@@ -130,15 +130,14 @@ def _of_one(case: Evaluated, outputs: tuple[Output, ...]) -> Answer[float]:
         (case.v_tilde, case.y_tilde, case.length_scale),
         cases,
     )
+    if cases.ends is not None:
+        values = {name: getattr(case, name) for name in BAND} | values
     if values:
         answer.outputs = {path: float(value) for path, value in values.items()}
-    if cases.ends is not None:
-        for name in BAND:
-            setattr(answer, name, getattr(case, name))
     if GRADIENT in outputs:
         answer.gradient, answer.gradient_bound = case.gradient, case.gradient_bound
     if STD in outputs:
-        answer.notes_on_outputs = bent(case, answer.outputs["std"])
+        answer.notes_on_outputs = rough(case, answer.outputs["std"])
     return answer
 
 
@@ -160,10 +159,8 @@ def _of_many(
         None if detail == "values" else (*map(shaped, GROUPS),),
         cases,
     )
-    answer.outputs = {path: shaped(path) for path in paths_of(outputs, cases.fields)}
-    if cases.ends is not None:
-        for name in BAND:
-            setattr(answer, name, shaped(name))
+    band = () if cases.ends is None else BAND
+    answer.outputs = {path: shaped(path) for path in (*band, *paths_of(outputs, cases.fields))}
     if GRADIENT in outputs:
         answer.gradient, answer.gradient_bound = (
             {field: shaped(f"{name} {field}") for field in cases.fields} for name in _SLOPES

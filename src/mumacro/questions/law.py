@@ -4,7 +4,6 @@ limit and borders."""
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -30,8 +29,6 @@ from mumacro.inputs.stiffening import Stiffening, stiffening_of
 from mumacro.inputs.units import unit_of
 from mumacro.kernel.arrays import Array
 from mumacro.outputs.answer import BAND, Answer
-from mumacro.outputs.deviation import one_deviation
-from mumacro.outputs.evaluated import Evaluated
 from mumacro.outputs.evaluation import chosen
 from mumacro.questions.borders import Crossing, border_crossings
 from mumacro.questions.input_curve import InputCurve
@@ -70,14 +67,11 @@ class Law(Result):
         six = {**self.case, name: per * self.values}
         return six if self.stiffening is None else six | self.stiffening.scaled(six, self.values)
 
-    @cached_property
+    @property
     def band(self) -> tuple[Array, Array] | None:
         """Return the smallest and the largest mu_macro [-], (n,) each, over an interval of k, or
         one deviation up and down of the uncertain inputs.  Return None if no input is uncertain."""
-        if self.std is not None:
-            tabulated = self.answer._surrogate.tabulated
-            return one_deviation(Evaluated(tabulated, self.answer.cases, "gradient"))
-        low, high = (getattr(self.answer, name, None) for name in BAND)
+        low, high = (self.answer.outputs.get(name) for name in BAND)
         return None if low is None or high is None else (low, high)
 
     @property
