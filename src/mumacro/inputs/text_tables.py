@@ -399,7 +399,15 @@ def _signs_in(table: TextTable, start: Piece) -> Signs:
     """Return the separators in numbers, from the first lines, or else from the first rows that
     show them."""
     data, shown = table.data_in(start), table.signs
-    for rows in chain([table.account_for(data)[0]] if data else [], table.rows()):
+
+    def without_signs(text: str) -> list[range] | None:
+        """Return a column of rows if no number has a separator, so that no row needs a look."""
+        signs = (".", '"', "\n\n", *"," * (table.sep != ","))
+        return None if any(sign in text for sign in signs) else [range(text.count("\n") + 1)]
+
+    for rows in chain([table.account_for(data)[0]] if data else [], table.rows(without_signs)):
+        if rows.columns:
+            continue
         shown = table.signs.shown_by(
             (
                 Cell(line, name, cells[i])

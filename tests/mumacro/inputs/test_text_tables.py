@@ -34,9 +34,9 @@ from mumacro.inputs.cells import (
     split_row,
 )
 from mumacro.inputs.decoding import Piece, Text
-from mumacro.inputs.layout import Dialect
+from mumacro.inputs.layout import LOOKED_AT, Dialect
 from mumacro.inputs.names import ColumnNames, absent
-from mumacro.inputs.text_tables import Most
+from mumacro.inputs.text_tables import Most, TextTable, find_table
 from mumacro.inputs.whole_tables import TableOfNumbers, read_numbers
 from tests.support.comparing import close
 
@@ -720,3 +720,24 @@ def test_columns_of_two_forces_stand_for_mu_macro() -> None:
         fit(in_newtons, y0=0.4e-6, f=20e3)
     measured = {"v0": V0, "mu_macro": MU, "Ft": [7.0] * len(V0)}  # mu_macro is what counts
     assert fit(measured, Fz=10.0, y0=0.4e-6, f=20e3).values["k"] == expected.values["k"]
+
+
+@pytest.mark.parametrize(("sep", "last"), [(",", "7"), (";", "7"), (",", "0.5"), (";", "0,5")])
+def test_the_decimal_separator_is_searched_in_lines_that_can_show_it(
+    monkeypatch: pytest.MonkeyPatch, sep: str, last: str
+) -> None:
+    rows = 100 * LOOKED_AT
+    lines = [sep.join(("v0", "mu_macro")), *[sep.join(("12", "7"))] * rows, sep.join(("12", last))]
+    accounted = 0
+    account = TextTable.account
+
+    def counted(table: TextTable, record: Any) -> Any:
+        nonlocal accounted
+        accounted += 1
+        return account(table, record)
+
+    monkeypatch.setattr(TextTable, "account", counted)
+    names = ColumnNames({"v0": "v0", "mu_macro": "mu0"}, [["v0"]])
+    table = find_table("\n".join(lines).encode(), names, Dialect())
+    assert table.signs.decimal == last.strip("0257")
+    assert accounted < 10 * LOOKED_AT or last != "7"
