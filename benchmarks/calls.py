@@ -187,7 +187,11 @@ def outputs(points: int, quick: bool) -> str:
         "groups": [with_groups],
         "limits": [with_groups, at_rest, crit],
         "gradient": [gradient],
-        "std": [gradient, lambda: [np.hypot(v, y) for _ in range(10)]],
+        "std": [
+            gradient,
+            lambda: [np.hypot(v, y) for _ in range(10)],
+            lambda: [plain() for _ in range(2 * len(spreads))],
+        ],
         "stick_fraction": [with_groups, partial(s.quantity, "stick_fraction", v, y)],
         "power": [with_groups, partial(s.quantity, "power", v, y)],
         "settling": [

@@ -424,7 +424,10 @@ def test_a_target_is_reached_and_drawn(open_page: Any, surrogate: Surrogate) -> 
     page.click("#solve-result button")
     assert (page.shown()["µ/µ₀"], page.shown()["shaker power"]) == ("0.5", f"{match[2]} mW")
     page.type("#field-Fz", "12 N")  # another case has another root at once
-    other = page.wait_for("#solve-result", r"y₀ = (\S+) µm")
+    page.wait_for("#solve-result", r"y₀ = \d\.\d{3} µm")
+    page.click("#digits")
+    other = page.wait_for("#solve-result", r"y₀ = (\d\.\d{5}) µm")
+    page.click("#digits")
     case = {**START, "Fz": 12.0, "y0": float(other[1]) * 1e-6}
     assert surrogate.evaluate(**case).mu_ratio == close(0.5, abs=1e-5)
     page.choose("#unknown", "k")

@@ -248,8 +248,9 @@ export function sidePanel(store, moved, found) {
   function results({ unknown, reachable, results: [{ roots }] }) {
     const typed = answer.inputs[unknown]?.unit;
     const { symbol } = about.inputs[unknown];
+    const digits = store.state.digits === "all" ? TAKEN : 4;
     const line = ({ value, mu_macro: mu, regime, power }) => {
-      const text = `${symbol} = ${inUnit(unknown, value, unitAt(unknown, value, typed), TAKEN)}`;
+      const text = `${symbol} = ${inUnit(unknown, value, unitAt(unknown, value, typed), digits)}`;
       const shaker = power ? `, shaker ${prefixed(power.oscillation, "W")}` : "";
       return html`<li>
         <span><b>${text}</b>: µ = ${friction(mu, 4)}, ${inWords(regime)}${shaker}</span>
@@ -316,6 +317,7 @@ export function sidePanel(store, moved, found) {
     list("values", numbers(answer, store.state.digits === "all"), origin);
     write("bars-of", whole(`Change of µ when an input grows by 1 %${middle && `, at ${middle}`}`));
     render(bars(answer), $("bars"));
+    draw(); // with as many digits as are wanted now
     solve(old);
   };
 }
